@@ -1,0 +1,46 @@
+"""Humanoid jumping with the iCub: a Gymnasium environment around two QP controllers.
+
+Importing this package registers ``ICubJump-v0``::
+
+    import gymnasium, icub_jump_env
+
+    env = gymnasium.make("ICubJump-v0", jump_height=0.04)
+"""
+
+from __future__ import annotations
+
+import gymnasium
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import (
+    ActionError,
+    CommandNotScalableError,
+    ConfigError,
+    ICubJumpError,
+    InvalidValueError,
+    MissingDependencyError,
+)
+
+__version__ = "0.1.0"
+
+ENV_ID = "ICubJump-v0"
+
+MAX_EPISODE_STEPS = 100_000
+"""Guard only: every episode ends by itself."""
+
+gymnasium.register(
+    id=ENV_ID,
+    entry_point="icub_jump_env.env:ICubJumpEnv",
+    max_episode_steps=MAX_EPISODE_STEPS,
+)
+
+__all__ = [
+    "ENV_ID",
+    "ActionError",
+    "CommandNotScalableError",
+    "ConfigError",
+    "ICubJumpError",
+    "InvalidValueError",
+    "JumpConfig",
+    "MissingDependencyError",
+]

@@ -1,0 +1,1 @@
+"""Controllers: QP, velocity controller (eq. 3), minimum jerk, phases of the jump."""

@@ -1,0 +1,125 @@
+"""The jump controller: phases, and in each the controller that decides the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.control.command import JointCommand, QPReport
+from icub_jump_env.control.minimum_jerk import MinimumJerk
+from icub_jump_env.control.phases import Phase, PhaseMachine
+from icub_jump_env.control.velocity import VelocityController
+from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
+from icub_jump_env.reference.com_reference import ComReference
+from icub_jump_env.reference.com_trajectory import PAPER_DISPLACEMENT, ComTrajectory
+from icub_jump_env.robot import facts
+
+Array = NDArray[np.float64]
+
+FLIGHT_MOTION_TIME = 0.12
+"""Duration of the minimum-jerk motion to the landing posture (s); a flight takes 0.19."""
+
+
+def landing_posture(crouch: Array, displacement: float) -> Array:
+    """Landing posture for a launch of ``displacement`` (m), (23,) rad.
+
+    A short launch takes off from a deeper crouch, from where the legs have to be
+    retracted further to clear the ground.
+    """
+    share = min(1.0, displacement / PAPER_DISPLACEMENT)
+    return crouch + share * (facts.LANDING - crouch)
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Outcome of one control tick.
+
+    Attributes:
+        phase: Phase the command belongs to.
+        command: Command to the joint servos.
+        report: How the QP went; ``None`` in phases without one.
+    """
+
+    phase: Phase
+    command: JointCommand
+    report: QPReport | None
+
+
+class JumpController:
+    """Launch on the QP, then minimum jerk to the landing posture, which is held.
+
+    Attributes:
+        reference: The CoM reference of the launching phase.
+        phases: The phase machine.
+        trajectory: The planned CoM trajectory of this jump.
+    """
+
+    def __init__(self, launch: VelocityController, crouch: Array, dt: float) -> None:
+        """Set up the controller.
+
+        Args:
+            launch: Controller of the launching phase.
+            crouch: (23,) posture the jump starts from (rad).
+            dt: Control period (s).
+        """
+        self._launch = launch
+        self._crouch = crouch
+        self._dt = dt
+        self.reference = ComReference()
+        self.phases = PhaseMachine()
+        self.trajectory: ComTrajectory
+        self._flight: MinimumJerk | None = None
+        self._flight_start = 0.0
+
+    def reset(self, trajectory: ComTrajectory, start_com: Array) -> None:
+        """Begin a jump.
+
+        Args:
+            trajectory: CoM trajectory of the launching phase.
+            start_com: (3,) estimated CoM at the start (m).
+        """
+        self.trajectory = trajectory
+        self.reference.reset(trajectory, start_com)
+        self.phases.reset()
+        self._launch.reset()
+        self._flight = None
+
+    def tick(
+        self,
+        time: float,
+        estimator: FeetFixedEstimator,
+        joint_position: Array,
+        normal_force: float,
+        residual_target: Array,
+    ) -> Tick:
+        """One control tick.
+
+        Args:
+            time: Time since the start of the launch (s).
+            estimator: Estimates for the present encoder readings.
+            joint_position: (23,) encoder readings (rad).
+            normal_force: Total measured normal force under the feet (N).
+            residual_target: (3,) target offset of the CoM reference (m); acts in the
+                launching phase only.
+
+        Returns:
+            The command and how it came about.
+        """
+        phase = self.phases.update(time, self.trajectory.duration, normal_force)
+        if phase is Phase.LAUNCH:
+            self.reference.update(time)
+            self.reference.residual.step(residual_target, self._dt)
+            velocity = self._launch.update(
+                estimator, joint_position, self.reference.position, self.reference.velocity
+            )
+            return Tick(phase, JointCommand(velocity), self._launch.report)
+
+        if self._flight is None:
+            goal = landing_posture(self._crouch, self.trajectory.displacement)
+            self._flight = MinimumJerk(joint_position.copy(), goal, FLIGHT_MOTION_TIME)
+            self._flight_start = time
+        # An early touch-down does not stop the motion, so that chatter cannot either.
+        position, velocity = self._flight.sample(time - self._flight_start)
+        return Tick(phase, JointCommand(velocity, position), None)

@@ -1,0 +1,123 @@
+"""Quadratic programs as values, and the check of a solution outside its solver.
+
+Every controller of this package poses
+
+    min_x  1/2 x^T H x + g^T x    subject to    lower <= (x, C x) <= upper,
+
+with bounds on the variables first and rows of C after them; a row whose lower and
+upper bounds are equal is an equality.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class QuadraticProgram:
+    """Buffers of one QP of fixed size, rewritten in place at each control tick.
+
+    Attributes:
+        H: (n, n) Hessian, positive definite.
+        g: (n,) gradient.
+        C: (m, n) constraint rows.
+        lower: (n + m,) lower bounds of x, then of C x.
+        upper: (n + m,) upper bounds.
+        n_equalities: The last ``n_equalities`` rows of C are equalities.
+    """
+
+    def __init__(self, n_variables: int, n_inequalities: int, n_equalities: int) -> None:
+        n, m = n_variables, n_inequalities + n_equalities
+        self.H = np.eye(n)
+        self.g = np.zeros(n)
+        self.C = np.zeros((m, n))
+        self.lower = np.zeros(n + m)
+        self.upper = np.zeros(n + m)
+        self.n_equalities = n_equalities
+
+    @property
+    def n(self) -> int:
+        """Number of variables."""
+        return self.g.size
+
+
+class QPStatus(StrEnum):
+    """What the solver claims and what the check outside of it found."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    SOLVER_ERROR = "solver error"
+    REJECTED = "rejected"
+    """The solver claims success but the residuals exceed the tolerances."""
+
+
+@dataclass(frozen=True, slots=True)
+class QPSolution:
+    """Primal and dual point that a solver returned.
+
+    Attributes:
+        x: (n,) primal variables.
+        multipliers: (n + m,) of the bounds and rows; positive at an upper bound.
+        status: The solver's claim.
+        iterations: Solver iterations.
+    """
+
+    x: Array
+    multipliers: Array
+    status: QPStatus
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True)
+class QPResiduals:
+    """How far a point is from optimal, computed without the solver.
+
+    Attributes:
+        primal: Largest violation of a bound or row (the row's unit).
+        dual: Largest entry of H x + g + multipliers^T (I, C), relative to that of g.
+        gap: Duality gap, relative to the cost.
+    """
+
+    primal: float
+    dual: float
+    gap: float
+
+
+@dataclass(frozen=True, slots=True)
+class QPTolerances:
+    """A solution with larger residuals is not applied."""
+
+    primal: float
+    dual: float
+    gap: float
+
+
+def check_solution(problem: QuadraticProgram, solution: QPSolution) -> QPResiduals:
+    """Primal and dual residual and duality gap of a solution.
+
+    Args:
+        problem: The QP.
+        solution: A claimed solution; NaN entries give NaN residuals.
+
+    Returns:
+        The residuals.
+    """
+    n, x, multipliers = problem.n, solution.x, solution.multipliers
+    values = np.concatenate((x, problem.C @ x))
+    below, above = problem.lower - values, values - problem.upper
+    primal = max(below.max(), above.max(), 0.0)
+
+    Hx = problem.H @ x
+    stationarity = Hx + problem.g + multipliers[:n] + multipliers[n:] @ problem.C
+    dual = np.abs(stationarity).max() / (1.0 + np.abs(problem.g).max())
+
+    # At the optimum each multiplier's bound is active; a wrong sign shows here.
+    slack = np.where(multipliers > 0, above, below)
+    gx = problem.g @ x
+    gap = abs(multipliers * slack).sum() / (1.0 + abs(gx))
+    return QPResiduals(float(primal), float(dual), float(gap))

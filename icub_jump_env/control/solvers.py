@@ -1,0 +1,139 @@
+"""QP solvers behind one interface: DAQP (default) and OSQP."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+import daqp
+import numpy as np
+import osqp
+import scipy.sparse as sp
+
+from icub_jump_env.control.qp import QPSolution, QPStatus, QPTolerances, QuadraticProgram
+
+SolverName = Literal["daqp", "osqp"]
+
+
+class QPSolver(Protocol):
+    """Solves the QP it was made for, as its buffers stand, without memory of earlier ones."""
+
+    tolerances: QPTolerances
+
+    def solve(self) -> QPSolution:
+        """Solve the problem as it stands."""
+        ...
+
+
+class DAQPSolver:
+    """Dual active-set solver; exact to rounding, fast, cold-started at each tick."""
+
+    tolerances = QPTolerances(primal=1e-8, dual=1e-8, gap=1e-6)
+
+    _EQUALITY = 5
+    _INFEASIBLE = -1
+
+    def __init__(self, problem: QuadraticProgram) -> None:
+        self._problem = problem
+        rows = problem.lower.size
+        self._sense = np.zeros(rows, dtype=np.int32)
+        self._sense[rows - problem.n_equalities :] = self._EQUALITY
+        self._model = daqp.Model()
+        self._model.setup(
+            problem.H, problem.g, problem.C, problem.upper, problem.lower, self._sense
+        )
+
+    def __reduce__(self) -> tuple[type[DAQPSolver], tuple[QuadraticProgram]]:
+        return DAQPSolver, (self._problem,)
+
+    def solve(self) -> QPSolution:
+        """Solve the problem as it stands."""
+        p = self._problem
+        # Passing the constraint senses discards the previous active set.
+        flag = self._model.update(p.H, p.g, p.C, p.upper, p.lower, self._sense)
+        if flag < 0:
+            status = QPStatus.INFEASIBLE if flag == self._INFEASIBLE else QPStatus.SOLVER_ERROR
+            return QPSolution(np.zeros(p.n), np.zeros(p.lower.size), status, 0)
+        x, _, flag, info = self._model.solve()
+        if flag > 0:
+            status = QPStatus.SOLVED
+        else:
+            status = QPStatus.INFEASIBLE if flag == self._INFEASIBLE else QPStatus.SOLVER_ERROR
+        return QPSolution(x, info["lam"], status, info["iterations"])
+
+
+class OSQPSolver:
+    """Operator-splitting solver; its structure is set up once, the iterate reset each time."""
+
+    tolerances = QPTolerances(primal=1e-6, dual=1e-6, gap=1e-4)
+
+    _RHO = 1.0
+
+    def __init__(self, problem: QuadraticProgram) -> None:
+        self._problem = problem
+        n, m = problem.n, problem.C.shape[0]
+        # OSQP wants the upper triangle, column by column, with a fixed pattern.
+        rows, cols = np.triu_indices(n)
+        order = np.lexsort((rows, cols))
+        self._upper_triangle = rows[order], cols[order]
+        P = sp.csc_matrix((np.ones(order.size), self._upper_triangle), shape=(n, n))
+        pattern = np.vstack((np.eye(n), np.ones((m, n))))
+        A = sp.csc_matrix(pattern)
+        A.sort_indices()
+        self._A_entries = A.indices, np.repeat(np.arange(n), np.diff(A.indptr))
+        self._stacked = np.vstack((np.eye(n), np.zeros((m, n))))
+        self._zero_x, self._zero_y = np.zeros(n), np.zeros(n + m)
+        self._solver = osqp.OSQP()
+        self._solver.setup(
+            P,
+            problem.g,
+            A,
+            problem.lower,
+            problem.upper,
+            eps_abs=1e-9,
+            eps_rel=1e-9,
+            max_iter=20000,
+            rho=self._RHO,
+            verbose=False,
+            # The cost weights span five decades; OSQP's own scaling makes that worse.
+            scaling=0,
+        )
+
+    def __reduce__(self) -> tuple[type[OSQPSolver], tuple[QuadraticProgram]]:
+        return OSQPSolver, (self._problem,)
+
+    def solve(self) -> QPSolution:
+        """Solve the problem as it stands."""
+        p = self._problem
+        self._stacked[p.n :] = p.C
+        self._solver.update(
+            Px=p.H[self._upper_triangle],
+            Ax=self._stacked[self._A_entries],
+            q=p.g,
+            l=p.lower,
+            u=p.upper,
+        )
+        # OSQP keeps its last iterate and step size; without these two lines its answer
+        # would depend on the problems before.
+        self._solver.update_settings(rho=self._RHO)
+        self._solver.warm_start(x=self._zero_x, y=self._zero_y)
+        result = self._solver.solve(raise_error=False)
+        if result.info.status == "solved":
+            status = QPStatus.SOLVED
+        elif "infeasible" in result.info.status:
+            status = QPStatus.INFEASIBLE
+        else:
+            status = QPStatus.SOLVER_ERROR
+        return QPSolution(
+            np.asarray(result.x), np.asarray(result.y), status, int(result.info.iter)
+        )
+
+
+SOLVERS: dict[SolverName, type[DAQPSolver] | type[OSQPSolver]] = {
+    "daqp": DAQPSolver,
+    "osqp": OSQPSolver,
+}
+
+
+def make_solver(name: SolverName, problem: QuadraticProgram) -> QPSolver:
+    """The solver called ``name``, set up for the size and pattern of ``problem``."""
+    return SOLVERS[name](problem)

@@ -1,0 +1,192 @@
+"""Velocity controller: the QP of eq. 3, paper section III-D.
+
+With the feet at rest (eq. 3c) the base velocity follows from the joints, so the QP is
+posed in the joint velocities. Limits and feet are hard; the CoM task (3b) and the
+momentum constraint (3d) enter the cost with large weights. As long as no limit is in
+the way that is eq. 3 to within the ratio of the weights. Where tasks and limits clash,
+the robot gives way in the order of the weights: first posture and smoothness, then
+momentum, then the CoM; never a limit, never the feet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.control.command import QPReport
+from icub_jump_env.control.qp import (
+    QPResiduals,
+    QPStatus,
+    QPTolerances,
+    QuadraticProgram,
+    check_solution,
+)
+from icub_jump_env.control.solvers import SolverName, make_solver
+from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
+from icub_jump_env.robot import facts
+
+Array = NDArray[np.float64]
+
+
+def _per_joint(leg: float, torso: float, arm: float) -> tuple[float, ...]:
+    return (leg,) * 12 + (torso,) * 3 + (arm,) * 8
+
+
+@dataclass(frozen=True)
+class VelocityGains:
+    """Gains and weights of eq. 3.
+
+    Attributes:
+        posture: K_p of the posture task (1/s).
+        com: K of the CoM task (1/s).
+        momentum: K of the momentum constraint (1/s).
+        posture_weight: Diagonal of Lambda, per joint.
+        smoothness_weight: Diagonal of Delta, per joint.
+        com_weight: Weight of the CoM task's residual ((m/s)^-2).
+        momentum_weight: Weight of the momentum residual ((kg m^2/s)^-2).
+        velocity_margin: Share of the speed limits that the QP may use; the rest is for
+            the servos' overshoot.
+    """
+
+    posture: float = 1.0
+    com: float = 10.0
+    momentum: float = 10.0
+    posture_weight: tuple[float, ...] = _per_joint(leg=1.0, torso=1.0, arm=0.1)
+    smoothness_weight: tuple[float, ...] = _per_joint(leg=0.1, torso=0.1, arm=0.01)
+    com_weight: float = 1e5
+    momentum_weight: float = 1e3
+    velocity_margin: float = 0.98
+
+
+class VelocityController:
+    """Joint velocities that track the CoM reference with the feet at rest.
+
+    Attributes:
+        report: How the latest tick's QP went.
+    """
+
+    def __init__(
+        self,
+        posture: Array,
+        position_limits: tuple[Array, Array],
+        dt: float,
+        momentum_control: bool = True,
+        solver: SolverName = "daqp",
+        gains: VelocityGains | None = None,
+    ) -> None:
+        """Set up the QP.
+
+        Args:
+            posture: (23,) s_d of the posture task (rad).
+            position_limits: Lower and upper joint limits, (23,) each (rad).
+            dt: Control period T_s (s).
+            momentum_control: Whether the momentum constraint (3d) is posed.
+            solver: QP solver.
+            gains: Gains; the defaults if ``None``.
+        """
+        gains = gains or VelocityGains()
+        n = facts.N_JOINTS
+        self.problem = QuadraticProgram(n, n_inequalities=0, n_equalities=6)
+        self._solver = make_solver(solver, self.problem)
+        self._gains = gains
+        self._dt = dt
+        self._posture = posture
+        self._lower_position, self._upper_position = position_limits
+        self._speed = facts.VELOCITY_LIMIT * gains.velocity_margin
+        self._Lambda = np.array(gains.posture_weight)
+        self._Delta = np.array(gains.smoothness_weight)
+        self._momentum_control = momentum_control
+        n_tasks = 6 if momentum_control else 3
+        self._sqrt_weight = np.sqrt(
+            np.repeat((gains.com_weight, gains.momentum_weight), 3)[:n_tasks]
+        )
+        self._tasks = np.zeros((n_tasks, n))
+        self._targets = np.zeros(n_tasks)
+        self._diagonal = np.arange(n)
+        self._previous = np.zeros(n)
+        self._momentum_integral = np.zeros(3)
+        self.report = _IDLE
+
+    def reset(self) -> None:
+        """Forget the previous command and the momentum integral."""
+        self._previous[:] = 0.0
+        self._momentum_integral[:] = 0.0
+        self.report = _IDLE
+
+    def update(
+        self,
+        estimator: FeetFixedEstimator,
+        joint_position: Array,
+        com_position: Array,
+        com_velocity: Array,
+    ) -> Array:
+        """One control tick.
+
+        Args:
+            estimator: Estimates for ``joint_position`` and the present velocities.
+            joint_position: (23,) measured s (rad).
+            com_position: (3,) reference x_dc (m).
+            com_velocity: (3,) reference x_dot_dc (m/s).
+
+        Returns:
+            (23,) joint velocities (rad/s) within the limits.
+        """
+        self._pose(estimator, joint_position, com_position, com_velocity)
+        solution = self._solver.solve()
+        residuals = check_solution(self.problem, solution)
+        status = solution.status
+        if status is QPStatus.SOLVED and not _acceptable(residuals, self._solver.tolerances):
+            status = QPStatus.REJECTED
+        self.report = QPReport(status, residuals, solution.iterations)
+
+        n = facts.N_JOINTS
+        # Keeping on is the best guess when the solver has none. Clipping also takes
+        # the last rounding error off a solution.
+        command = self._previous if self.report.failed else solution.x
+        np.clip(command, self.problem.lower[:n], self.problem.upper[:n], out=self._previous)
+        return self._previous.copy()
+
+    def _pose(
+        self,
+        estimator: FeetFixedEstimator,
+        s: Array,
+        com_position: Array,
+        com_velocity: Array,
+    ) -> None:
+        gains, problem, kinematics = self._gains, self.problem, estimator.kinematics
+        tasks, targets, weight = self._tasks, self._targets, self._sqrt_weight
+        tasks[:3] = kinematics.J_com
+        targets[:3] = com_velocity - gains.com * (estimator.com - com_position)  # (3b)
+        if self._momentum_control:
+            self._momentum_integral += estimator.angular_momentum * self._dt
+            tasks[3:] = kinematics.J_momentum
+            targets[3:] = -gains.momentum * self._momentum_integral  # (3d)
+        tasks *= weight[:, None]
+        targets *= weight
+
+        Lambda, Delta = self._Lambda, self._Delta
+        np.matmul(tasks.T, tasks, out=problem.H)
+        problem.H[self._diagonal, self._diagonal] += Lambda + Delta
+        posture_velocity = -gains.posture * (s - self._posture)
+        problem.g[:] = -(Lambda * posture_velocity + Delta * self._previous + targets @ tasks)
+
+        problem.C[:] = kinematics.J_feet  # (3c)
+
+        n, speed = facts.N_JOINTS, self._speed
+        lower, upper = problem.lower[:n], problem.upper[:n]  # (3e), forward Euler
+        np.clip((self._lower_position - s) / self._dt, -speed, speed, out=lower)
+        np.clip((self._upper_position - s) / self._dt, -speed, speed, out=upper)
+
+
+_IDLE = QPReport(QPStatus.SOLVED, QPResiduals(0.0, 0.0, 0.0), 0)
+
+
+def _acceptable(residuals: QPResiduals, tolerances: QPTolerances) -> bool:
+    # Written so that NaN residuals are not acceptable.
+    return (
+        residuals.primal <= tolerances.primal
+        and residuals.dual <= tolerances.dual
+        and residuals.gap <= tolerances.gap
+    )

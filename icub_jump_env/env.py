@@ -1,0 +1,368 @@
+"""The Gymnasium environment: reset and step, orchestration only."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from icub_jump_env import observation
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.command import QPReport
+from icub_jump_env.control.jump import JumpController
+from icub_jump_env.control.phases import Phase
+from icub_jump_env.control.velocity import VelocityController
+from icub_jump_env.errors import ActionError
+from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
+from icub_jump_env.metrics.jump import JointLimits, JumpRecorder
+from icub_jump_env.reference.com_trajectory import plan_com_trajectory
+from icub_jump_env.reward import reward_terms
+from icub_jump_env.robot import facts
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.statics import holding_torque
+from icub_jump_env.simulation.actuators import JointServo
+from icub_jump_env.simulation.ground_truth import GroundTruth
+from icub_jump_env.simulation.physics import Physics
+from icub_jump_env.simulation.rendering import Renderer, make_renderer
+from icub_jump_env.simulation.sensors import Sensors
+
+FALLEN_TILT = math.radians(60.0)
+"""Chest tilt (rad) beyond which the robot has fallen."""
+
+TAKEOFF_GRACE = 0.5
+"""Time after T (s) within which the robot must have left the ground."""
+
+SETTLING_TIME = 0.3
+"""Time (s) that a reset lets the soles settle into the floor before the jump starts."""
+
+
+class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """The iCub jumps from a crouch; an agent may shift the CoM reference meanwhile.
+
+    ## Description
+    The controller of Bergonti, Fiorio and Pucci ("Torque and velocity controllers to
+    perform jumps with a humanoid robot") launches the robot along a CoM trajectory
+    scaled to the commanded height, retracts the feet in flight and holds a posture to
+    land. The baseline needs no agent: action zero is the pure controller, bit for bit.
+
+    ## Action space
+    ``Box(-1, 1, (3,), float32)``: target offset of the CoM reference in units of
+    ``residual_scale``, forward, lateral and vertical, world frame. A critically damped
+    filter turns it into a consistent offset, velocity and acceleration. It acts in the
+    launching phase. One step lasts ``dt`` = 0.01 s by default.
+
+    ## Observation space
+    ``Box(-10, 10, (SIZE,), float32)``: sensor readings, estimates made of them, the
+    command and the phase; entry by entry in :mod:`icub_jump_env.observation` and
+    docs/environment.md. No privileged state.
+
+    ## Rewards
+    The sum of the ``reward_*`` entries of ``info``, see
+    :func:`icub_jump_env.reward.reward_terms`.
+
+    ## Starting state
+    At rest in the crouch, soles flat on the floor, the world origin on the floor midway
+    between the feet. World +x is where the robot faces, +y left, +z up; positive pitch
+    about +y.
+
+    ## Episode end
+    Terminates on a fall (anything but the soles touches the floor, or the chest tilts
+    more than 60 deg), without take-off by T + 0.5 s, ``stand_time`` after touch-down,
+    or when the simulation diverges. ``info["outcome"]`` says which. The TimeLimit of
+    the registration only guards.
+
+    ## Info
+    Every step: ``jump`` (dict of :class:`icub_jump_env.metrics.jump.JumpMetrics`, final
+    at the end), ``is_success``, ``outcome``, ``phase``, ``time``, ``diverged``,
+    ``solver_status``, ``solver_residuals`` and the reward terms. ``reset`` returns the
+    command.
+
+    ## Arguments
+    The fields of :class:`icub_jump_env.config.JumpConfig`. ``reset(options=
+    {"jump_height": 0.05})`` overrides the command for one episode.
+
+    ## Version history
+    v0: first version.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 (declared so by Gymnasium)
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 100,
+    }
+
+    def __init__(self, **config: Any) -> None:
+        """Build the world and the controllers.
+
+        Args:
+            config: Fields of :class:`JumpConfig`.
+
+        Raises:
+            ConfigError: If a field is unknown or out of range.
+        """
+        self.config = JumpConfig.from_kwargs(config)
+        self.render_mode = self.config.render_mode
+        self.metadata = {**self.metadata, "render_fps": round(self.config.agent_frequency)}
+        limit = observation.OBSERVATION_LIMIT
+        self.observation_space = spaces.Box(-limit, limit, (observation.SIZE,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
+
+        cfg = self.config
+        self._physics = Physics(
+            cfg.timestep, cfg.ankle_shift, visuals=self.render_mode is not None
+        )
+        self._truth = GroundTruth(self._physics)
+        self._sensors = Sensors(self._physics)
+        self._servo = JointServo(cfg.timestep)
+        self._estimator = FeetFixedEstimator(FeetFixedKinematics(cfg.ankle_shift))
+        limits = self._joint_limits()
+        self._recorder = JumpRecorder(limits, cfg.stand_time)
+        self._crouch = facts.crouch(cfg.ankle_shift)
+        launch = VelocityController(
+            self._crouch,
+            (limits.lower_position, limits.upper_position),
+            cfg.control_dt,
+            cfg.momentum_control,
+            cfg.solver,
+        )
+        self._controller = JumpController(launch, self._crouch, cfg.control_dt)
+        self._crouch_base, self._crouch_torque = self._plan_crouch()
+        self._residual_scale = np.array(cfg.residual_scale)
+        self._start_com = np.zeros(3)
+        self._episode = cfg
+        self._outcome = "running"
+        self._report: QPReport | None = None
+        self._observation = np.zeros(observation.SIZE, np.float32)
+        self._renderer: Renderer | None = None
+        if self.render_mode is not None:
+            self._renderer = make_renderer(self._physics, self.render_mode)
+
+    @property
+    def model(self) -> Any:
+        """The ``mujoco.MjModel``."""
+        return self._physics.model
+
+    @property
+    def data(self) -> Any:
+        """The ``mujoco.MjData``."""
+        return self._physics.data
+
+    @property
+    def dt(self) -> float:
+        """Duration of one step (s)."""
+        return 1.0 / self.config.agent_frequency
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start an episode at rest in the crouch.
+
+        Args:
+            seed: Seed of the environment's generator.
+            options: ``{"jump_height": float}`` overrides the command (m) for this
+                episode.
+
+        Returns:
+            Observation and info.
+
+        Raises:
+            ConfigError: If an option is unknown or out of range.
+        """
+        episode = self.config.with_options(options)
+        super().reset(seed=seed)
+        self._episode = episode
+        self._settle()
+        self._sensors.read()
+        self._estimator.update(self._sensors.joint_position, self._sensors.joint_velocity)
+        self._start_com[:] = self._estimator.com
+        trajectory = plan_com_trajectory(
+            episode.jump_height, episode.com_displacement, episode.com_scaling
+        )
+        self._controller.reset(trajectory, self._start_com)
+        self._recorder.reset()
+        self._outcome = "running"
+        self._report = None
+        self._observe()
+        if self.render_mode == "human":
+            self.render()
+        return self._observation.copy(), self._info()
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Advance by ``dt``; less if the episode ends within.
+
+        Args:
+            action: (3,) in [-1, 1].
+
+        Returns:
+            Observation, reward, terminated, truncated (always False) and info.
+
+        Raises:
+            ActionError: If the action is misshapen, not finite or out of range.
+        """
+        action64 = _check_action(action)
+        target = action64 * self._residual_scale
+        for _ in range(self.config.controls_per_step):
+            if self._outcome == "running":
+                self._control_tick(target)
+        terminated = self._outcome != "running"
+        if self._outcome != "diverged":
+            self._observe()
+        terms = reward_terms(
+            self._recorder.metrics, self._episode.jump_height, action64, terminated
+        )
+        if self.render_mode == "human":
+            self.render()
+        reward = sum(terms.values())
+        return self._observation.copy(), reward, terminated, False, self._info() | terms
+
+    def render(self) -> Any:
+        """A picture, (height, width, 3) uint8, in mode ``rgb_array``; else None."""
+        if self._renderer is None:
+            gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human' in make().")
+            return None
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Free the renderer."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A renderer holds a graphics context; a copy opens its own.
+        return self.__dict__ | {"_renderer": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if self.render_mode is not None:
+            self._renderer = make_renderer(self._physics, self.render_mode)
+
+    def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
+        physics, sensors = self._physics, self._sensors
+        if physics.diverged:
+            self._outcome = "diverged"
+            return
+        sensors.read()
+        self._estimator.update(sensors.joint_position, sensors.joint_velocity)
+        tick = self._controller.tick(
+            physics.data.time,
+            self._estimator,
+            sensors.joint_position,
+            float(sensors.foot_force.sum()),
+            residual_target,
+        )
+        self._report = tick.report
+        if tick.report is not None and tick.report.failed:
+            self._recorder.metrics.solver_failures += 1.0
+        self._servo.command(tick.command)
+        for _ in range(self.config.physics_per_control):
+            physics.step(self._servo.torque(physics.joint_position, physics.joint_velocity))
+            if physics.diverged:
+                self._outcome = "diverged"
+                return
+            self._recorder.update(self._truth.read())
+            self._outcome = self._judge()
+            if self._outcome != "running":
+                return
+
+    def _judge(self) -> str:
+        truth = self._truth.state
+        if not truth.only_feet_touch or truth.chest_tilt > FALLEN_TILT:
+            return "fell"
+        if self._recorder.stood:
+            return "stood"
+        deadline = self._controller.trajectory.duration + TAKEOFF_GRACE
+        if truth.time >= deadline and math.isnan(self._recorder.metrics.takeoff_time):
+            return "no take-off"
+        return "running"
+
+    def _settle(self) -> None:
+        physics, servo = self._physics, self._servo
+        physics.reset(*self._crouch_base, self._crouch)
+        servo.reset(self._crouch, self._crouch_torque)
+        for _ in range(round(SETTLING_TIME / self.config.timestep)):
+            physics.step(servo.torque(physics.joint_position, physics.joint_velocity))
+        physics.restart_clock()
+
+    def _plan_crouch(
+        self,
+    ) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
+        """Base position and quaternion (wxyz) of the crouch, and the torques to hold it."""
+        kinematics = self._estimator.kinematics
+        kinematics.update(self._crouch)
+        rotation = Rotation.from_matrix(kinematics.base_rotation)
+        position = kinematics.base_position.copy()
+        q = np.concatenate((position, rotation.as_quat(), self._crouch))
+        base = position, rotation.as_quat(scalar_first=True)
+        return base, holding_torque(q, self.config.ankle_shift)
+
+    def _joint_limits(self) -> JointLimits:
+        lower, upper = self._physics.model.jnt_range[1:].T
+        return JointLimits(lower, upper, facts.VELOCITY_LIMIT, facts.EFFORT_LIMIT)
+
+    def _observe(self) -> None:
+        sensors, estimator, controller = self._sensors, self._estimator, self._controller
+        sensors.read()
+        estimator.update(sensors.joint_position, sensors.joint_velocity)
+        phase, trajectory = controller.phases.phase, controller.trajectory
+        reference, time = controller.reference, self._physics.data.time
+        one_hot = np.zeros(len(Phase))
+        one_hot[phase] = 1.0
+        com_error = np.zeros(3)
+        if phase is Phase.LAUNCH:
+            reference.update(time)
+            com_error = estimator.com - reference.position
+        values = {
+            "phase": one_hot,
+            "launch_progress": min(1.0, time / trajectory.duration),
+            "time": time,
+            "jump_height": self._episode.jump_height,
+            "com_displacement": trajectory.displacement,
+            "takeoff_time": trajectory.duration,
+            "joint_position": sensors.joint_position - self._crouch,
+            "joint_velocity": sensors.joint_velocity,
+            "gravity": sensors.gravity,
+            "gyro": sensors.gyro,
+            "com_offset": estimator.com - self._start_com,
+            "com_velocity": estimator.com_velocity,
+            "angular_momentum": estimator.angular_momentum,
+            "com_error": com_error,
+            "residual_offset": reference.residual.offset,
+            "residual_velocity": reference.residual.velocity,
+            "foot_force": sensors.foot_force,
+        }
+        self._observation = observation.encode(values)
+
+    def _info(self) -> dict[str, Any]:
+        metrics, report = self._recorder.metrics, self._report
+        residuals = report.residuals if report else None
+        return {
+            "jump": metrics.as_dict(),
+            "is_success": metrics.is_success(self._episode.jump_height),
+            "outcome": self._outcome,
+            "diverged": self._outcome == "diverged",
+            "phase": self._controller.phases.phase.name.lower(),
+            "time": float(self._physics.data.time),
+            "jump_height": self._episode.jump_height,
+            "solver_status": str(report.status) if report else "idle",
+            "solver_primal_residual": residuals.primal if residuals else 0.0,
+            "solver_dual_residual": residuals.dual if residuals else 0.0,
+            "solver_gap": residuals.gap if residuals else 0.0,
+        }
+
+
+def _check_action(action: Any) -> NDArray[np.float64]:
+    allowed = "three finite numbers in [-1, 1]"
+    try:
+        array = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ActionError("action", action, allowed) from None
+    if array.shape != (3,) or not (np.abs(array) <= 1.0).all():
+        raise ActionError("action", action, allowed)
+    return array

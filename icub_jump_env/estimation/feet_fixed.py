@@ -1,0 +1,40 @@
+"""CoM, momentum and base from the encoders, assuming that the feet stand still.
+
+Paper, section III-D: "evaluated assuming that the feet are in contact with the ground
+and they don't slide nor rotate". After take-off the assumption fails and so do the
+estimates (paper, Fig. 4).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
+
+Array = NDArray[np.float64]
+
+
+class FeetFixedEstimator:
+    """Estimates that the controllers and the observation use, world frame.
+
+    Attributes:
+        kinematics: Feet-fixed kinematics at the latest joint positions.
+        com: (3,) CoM position x (m).
+        com_velocity: (3,) CoM velocity (m/s).
+        angular_momentum: (3,) centroidal angular momentum H_omega (kg m^2/s).
+    """
+
+    def __init__(self, kinematics: FeetFixedKinematics) -> None:
+        self.kinematics = kinematics
+        self.com = np.zeros(3)
+        self.com_velocity = np.zeros(3)
+        self.angular_momentum = np.zeros(3)
+
+    def update(self, joint_position: Array, joint_velocity: Array) -> None:
+        """Take in encoder readings, (23,) rad and (23,) rad/s."""
+        kinematics = self.kinematics
+        kinematics.update(joint_position)
+        self.com[:] = kinematics.com
+        np.matmul(kinematics.J_com, joint_velocity, out=self.com_velocity)
+        np.matmul(kinematics.J_momentum, joint_velocity, out=self.angular_momentum)

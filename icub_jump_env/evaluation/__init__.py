@@ -1,0 +1,1 @@
+"""Evaluation: rollouts, the table against the paper, figures, video."""

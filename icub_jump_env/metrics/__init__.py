@@ -1,0 +1,1 @@
+"""Jump metrics from the true state; independent of the simulator and environment."""

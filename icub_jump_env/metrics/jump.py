@@ -1,0 +1,220 @@
+"""Jump metrics from the true state, updated at every physics step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.metrics.state import TrueState
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.81
+AIRBORNE_FORCE = 1.0
+"""The robot is airborne while the ground carries less than this (N)."""
+LANDED_TILT = math.radians(30.0)
+"""A landed robot keeps its chest within this tilt (rad)."""
+SPEED_TOLERANCE = 1.03
+"""A joint violates its speed limit above this multiple of it."""
+POSITION_TOLERANCE = 1e-3
+"""... and its position limit beyond this (rad): MuJoCo's limits are slightly soft."""
+MIN_FLIGHT_TIME = 0.1
+MIN_HEIGHT_RATIO = 0.7
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits whose violations are counted, (n,) arrays in SI units."""
+
+    lower_position: Array
+    upper_position: Array
+    speed: Array
+    torque: Array
+
+
+@dataclass(slots=True)
+class JumpMetrics:
+    """Result of one jump, plain floats and bools in SI units; NaN where undefined.
+
+    Attributes:
+        takeoff_time: Last loss of ground contact before the apex (s).
+        takeoff_velocity: Vertical CoM velocity then (m/s).
+        ballistic_height: takeoff_velocity^2 / 2g (m).
+        flight_time: Time from take-off to the first contact after the apex (s); 0
+            without a flight.
+        flight_height: Apex CoM height minus CoM height at take-off (m); 0 without a
+            flight.
+        apex_height: Largest CoM height in flight (m, above the floor).
+        sole_height: Largest height in flight of the lower sole's lowest corner (m).
+        flight_rotation: Rotation of the equivalent rigid body about +y: the locked
+            angular velocity integrated over the flight (rad).
+        base_pitch_range: Largest minus smallest base pitch in flight (rad).
+        angular_momentum_takeoff: Angular momentum about the CoM at take-off, world
+            axes (kg m^2/s).
+        peak_ground_force: Largest vertical ground force of the episode (N).
+        landed: Whether, ``stand_time`` after touch-down, only the feet had touched the
+            ground and the chest had stayed within 30 deg of upright.
+        solver_failures: Control ticks whose QP solution was not applied.
+        limit_violations: Physics steps with a joint beyond 1.03 x its speed limit, or
+            beyond its torque or position limit.
+    """
+
+    takeoff_time: float = math.nan
+    takeoff_velocity: float = math.nan
+    ballistic_height: float = math.nan
+    flight_time: float = 0.0
+    flight_height: float = 0.0
+    apex_height: float = math.nan
+    sole_height: float = math.nan
+    flight_rotation: float = math.nan
+    base_pitch_range: float = math.nan
+    angular_momentum_takeoff: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    peak_ground_force: float = 0.0
+    landed: bool = False
+    solver_failures: float = 0.0
+    limit_violations: float = 0.0
+
+    def is_success(self, jump_height: float) -> bool:
+        """At least 0.1 s in the air, 70 % of the commanded height (m), and landed."""
+        return (
+            self.landed
+            and self.flight_time >= MIN_FLIGHT_TIME
+            and self.flight_height >= MIN_HEIGHT_RATIO * jump_height
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The metrics by name."""
+        return asdict(self)
+
+
+@dataclass(slots=True)
+class _Flight:
+    """One spell in the air."""
+
+    time: float
+    height: float
+    velocity: float
+    momentum: tuple[float, float, float]
+    duration: float = 0.0
+    apex: float = -math.inf
+    sole: float = -math.inf
+    rotation: float = 0.0
+    pitch_low: float = math.inf
+    pitch_high: float = -math.inf
+
+
+class JumpRecorder:
+    """Watches the true state and keeps the metrics of the jump up to date.
+
+    The flight that counts is the one with the highest apex, so that neither chatter
+    before take-off nor a bounce after landing is taken for it.
+
+    Attributes:
+        metrics: The metrics so far.
+        touchdown_time: First contact after the apex (s); NaN before.
+    """
+
+    def __init__(self, limits: JointLimits, stand_time: float) -> None:
+        """Start recording.
+
+        Args:
+            limits: Joint limits to watch.
+            stand_time: Time (s) to stand after touch-down.
+        """
+        self._limits = limits
+        self._speed = limits.speed * SPEED_TOLERANCE
+        self._lower = limits.lower_position - POSITION_TOLERANCE
+        self._upper = limits.upper_position + POSITION_TOLERANCE
+        self._torque = limits.torque * (1 + 1e-9)
+        self._stand_time = stand_time
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self.metrics = JumpMetrics()
+        self.touchdown_time = math.nan
+        self._flight: _Flight | None = None
+        self._best_apex = -math.inf
+        self._last_time: float | None = None
+        self._upright = True
+
+    @property
+    def stood(self) -> bool:
+        """Whether ``stand_time`` has passed since touch-down."""
+        return bool(
+            self._last_time is not None
+            and (self._last_time - self.touchdown_time >= self._stand_time - 1e-9)
+        )
+
+    def update(self, state: TrueState) -> None:
+        """Take in the true state of one physics step."""
+        metrics = self.metrics
+        dt = 0.0 if self._last_time is None else state.time - self._last_time
+        self._last_time = state.time
+        if state.ground_force > metrics.peak_ground_force:
+            metrics.peak_ground_force = state.ground_force
+        self._upright = self._upright and state.only_feet_touch and state.chest_tilt < LANDED_TILT
+        if self._violates(state):
+            metrics.limit_violations += 1.0
+
+        if state.ground_force < AIRBORNE_FORCE:
+            if self._flight is None:
+                self._flight = _take_off(state)
+            self._fly(self._flight, state, dt)
+        elif self._flight is not None:
+            self._touch_down(self._flight, state.time)
+        metrics.landed = self._upright and self.stood
+
+    def _violates(self, state: TrueState) -> bool:
+        return bool(
+            (np.abs(state.joint_velocity) > self._speed).any()
+            or (np.abs(state.joint_torque) > self._torque).any()
+            or (state.joint_position < self._lower).any()
+            or (state.joint_position > self._upper).any()
+        )
+
+    def _fly(self, flight: _Flight, state: TrueState, dt: float) -> None:
+        locked_velocity = np.linalg.solve(state.locked_inertia, state.angular_momentum)
+        flight.rotation += float(locked_velocity[1]) * dt
+        flight.duration = state.time - flight.time
+        flight.apex = max(flight.apex, float(state.com[2]))
+        flight.sole = max(flight.sole, state.sole_height)
+        flight.pitch_low = min(flight.pitch_low, state.base_pitch)
+        flight.pitch_high = max(flight.pitch_high, state.base_pitch)
+        if flight.apex >= self._best_apex:
+            self._best_apex = flight.apex
+            self.touchdown_time = math.nan
+            self._publish(flight)
+
+    def _publish(self, flight: _Flight) -> None:
+        metrics = self.metrics
+        metrics.takeoff_time = flight.time
+        metrics.takeoff_velocity = flight.velocity
+        metrics.ballistic_height = flight.velocity**2 / (2 * GRAVITY)
+        metrics.flight_time = flight.duration
+        metrics.flight_height = flight.apex - flight.height
+        metrics.apex_height = flight.apex
+        metrics.sole_height = flight.sole
+        metrics.flight_rotation = flight.rotation
+        metrics.base_pitch_range = flight.pitch_high - flight.pitch_low
+        metrics.angular_momentum_takeoff = flight.momentum
+
+    def _touch_down(self, flight: _Flight, time: float) -> None:
+        if flight.apex >= self._best_apex:
+            self.metrics.flight_time = time - flight.time
+            self.touchdown_time = time
+        self._flight = None
+
+
+def _take_off(state: TrueState) -> _Flight:
+    x, y, z = (float(h) for h in state.angular_momentum)
+    return _Flight(
+        time=state.time,
+        height=float(state.com[2]),
+        velocity=float(state.com_velocity[2]),
+        momentum=(x, y, z),
+    )

@@ -1,0 +1,1 @@
+"""CoM reference: scaled trajectory (section III-A) and learned residual."""

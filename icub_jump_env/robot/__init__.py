@@ -1,0 +1,1 @@
+"""The iCub: facts, URDF, MuJoCo and Pinocchio models, kinematics of standing."""

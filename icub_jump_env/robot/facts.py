@@ -1,0 +1,239 @@
+"""Numbers of the iCub that the jump depends on, each with its source.
+
+Everything else (link masses, inertias, kinematics, joint position limits,
+viscous damping) is read from the ``iCubGenova04`` URDF of the icub-models
+package. ``tests/robot/test_facts.py`` asserts these numbers on the compiled
+models and on the URDF itself.
+
+Joint order, everywhere in this package: Pinocchio's order of the URDF, that is
+left leg, right leg, torso, left arm, right arm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+URDF_MODEL = "iCubGenova04"
+"""The model of the icub-models package: the paper's robot, iCub v2.5."""
+
+BASE_LINK = "root_link"
+"""Base of the floating-base model. It faces its own -x, hence the yaw below."""
+
+BASE_YAW = math.pi
+"""Yaw (rad) of ``root_link`` when the robot faces world +x."""
+
+CHEST_LINK = "chest"
+
+_LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
+_ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
+_TORSO = ("torso_pitch", "torso_roll", "torso_yaw")
+
+JOINT_NAMES: tuple[str, ...] = (
+    *(f"l_{name}" for name in _LEG),
+    *(f"r_{name}" for name in _LEG),
+    *_TORSO,
+    *(f"l_{name}" for name in _ARM),
+    *(f"r_{name}" for name in _ARM),
+)
+"""The 23 joints of the jump (paper section IV); neck and wrists are locked at 0."""
+
+N_JOINTS = len(JOINT_NAMES)
+LEFT_LEG = slice(0, 6)
+RIGHT_LEG = slice(6, 12)
+TORSO = slice(12, 15)
+ARMS = slice(15, 23)
+
+JOINT_INDEX: Mapping[str, int] = MappingProxyType(
+    {name: index for index, name in enumerate(JOINT_NAMES)}
+)
+
+
+@dataclass(frozen=True)
+class Motor:
+    """Motor and transmission of one joint.
+
+    Attributes:
+        effort: Largest joint torque (Nm).
+        velocity: Largest joint speed (rad/s).
+        rotor_inertia: Inertia of the rotor about its axis (kg m^2).
+        gear_inertia: Inertia of the harmonic drive on the motor side (kg m^2).
+        gear_ratio: Motor turns per joint turn.
+    """
+
+    effort: float
+    velocity: float
+    rotor_inertia: float
+    gear_inertia: float
+    gear_ratio: float
+
+    @property
+    def armature(self) -> float:
+        """Inertia reflected to the joint side (kg m^2)."""
+        return (self.rotor_inertia + self.gear_inertia) * self.gear_ratio**2
+
+
+# Effort and speed: the legs' are the URDF's. Torso and arms carry the placeholder
+# 50000 there; 37 Nm (torso), 20 Nm (arms) and 7.64 rad/s are our assumptions: the
+# torso uses the legs' motor group, the arms a smaller one.
+# Inertias and ratios: the public configuration of IIT's whole-body-controllers for
+# the iCub (configRobot.m, "motors reflected inertia"): rotors of 0.0827e-4 kg m^2
+# (legs, torso pitch and roll) and 0.0585e-4 (torso yaw, arms), harmonic drives of
+# 0.054e-4 and 0.021e-4; ratios 100, hip pitch 150, torso yaw 200.
+_LEG_MOTOR = Motor(37.0, 7.64, 0.0827e-4, 0.054e-4, 100.0)
+_HIP_PITCH_MOTOR = Motor(55.5, 5.1, 0.0827e-4, 0.054e-4, 150.0)
+_TORSO_YAW_MOTOR = Motor(37.0, 7.64, 0.0585e-4, 0.021e-4, 200.0)
+_ARM_MOTOR = Motor(20.0, 7.64, 0.0585e-4, 0.021e-4, 100.0)
+
+
+def _motor_of(joint: str) -> Motor:
+    if joint.endswith("hip_pitch"):
+        return _HIP_PITCH_MOTOR
+    if joint == "torso_yaw":
+        return _TORSO_YAW_MOTOR
+    if joint.endswith(_ARM):
+        return _ARM_MOTOR
+    return _LEG_MOTOR
+
+
+MOTORS: tuple[Motor, ...] = tuple(_motor_of(name) for name in JOINT_NAMES)
+"""Motor of each joint, in joint order."""
+
+URDF_PLACEHOLDER = 50000.0
+"""Effort and velocity that the URDF gives where it knows none."""
+
+
+def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    values.setflags(write=False)
+    return values
+
+
+EFFORT_LIMIT = _frozen(np.array([motor.effort for motor in MOTORS]))
+"""(23,) Nm."""
+VELOCITY_LIMIT = _frozen(np.array([motor.velocity for motor in MOTORS]))
+"""(23,) rad/s."""
+ARMATURE = _frozen(np.array([motor.armature for motor in MOTORS]))
+"""(23,) kg m^2."""
+
+ANKLE_PITCH_JOINTS = ("l_ankle_pitch", "r_ankle_pitch")
+ANKLE_SHIFT = math.radians(15.0)
+"""The paper's modification (section IV): the ankle pitch range moved by -15 deg."""
+
+
+@dataclass(frozen=True)
+class Sole:
+    """Contact rectangle of a foot, in its sole frame (x forward, y left, z up).
+
+    Source: collision box of the iCub V2_5 Gazebo model.
+    """
+
+    x_min: float = -0.0535
+    x_max: float = 0.1065
+    half_width: float = 0.036
+    bottom: float = -0.0105
+
+    @property
+    def half_length(self) -> float:
+        """Half of the sole's length (m)."""
+        return (self.x_max - self.x_min) / 2
+
+    @property
+    def center_x(self) -> float:
+        """Middle of the sole along x (m)."""
+        return (self.x_max + self.x_min) / 2
+
+
+SOLE = Sole()
+SOLE_FRAMES = ("l_sole", "r_sole")
+FEET_FRICTION = 0.8
+"""Coulomb friction between soles (rubber) and floor; our assumption."""
+
+# Boxes that keep the rest of a fallen robot on the floor: centre and half size (m) in
+# the link frame, the axis-aligned bounds of the link's visual mesh.
+BODY_BOXES: Mapping[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = (
+    MappingProxyType(
+        {
+            "root_link": ((0.031, 0.0, -0.062), (0.073, 0.111, 0.094)),
+            "chest": ((0.0, 0.076, -0.060), (0.121, 0.116, 0.139)),
+            "head": ((-0.008, 0.118, -0.017), (0.085, 0.092, 0.105)),
+            "l_upper_leg": ((0.004, 0.002, -0.057), (0.059, 0.057, 0.120)),
+            "r_upper_leg": ((0.004, -0.002, -0.057), (0.059, 0.057, 0.120)),
+            "l_lower_leg": ((0.007, 0.002, -0.098), (0.058, 0.054, 0.126)),
+            "r_lower_leg": ((0.007, -0.002, -0.098), (0.058, 0.054, 0.126)),
+            "l_upper_arm": ((-0.014, 0.0, 0.030), (0.050, 0.040, 0.065)),
+            "r_upper_arm": ((-0.014, 0.0, 0.030), (0.050, 0.040, 0.065)),
+            "l_forearm": ((0.042, -0.002, 0.003), (0.073, 0.037, 0.055)),
+            "r_forearm": ((-0.042, 0.0, 0.003), (0.073, 0.037, 0.054)),
+            "l_hand": ((0.069, 0.008, 0.044), (0.079, 0.026, 0.067)),
+            "r_hand": ((-0.069, 0.008, 0.043), (0.079, 0.025, 0.066)),
+        }
+    )
+)
+
+
+def posture(**degrees: float) -> NDArray[np.float64]:
+    """A left-right symmetric posture from joint angles in degrees.
+
+    Args:
+        degrees: Angle (deg) by joint name, without the ``l_``/``r_`` prefix for arms
+            and legs. Joints left out are at 0.
+
+    Returns:
+        (23,) joint positions (rad), read-only.
+
+    Raises:
+        KeyError: If a name is no joint of the robot.
+    """
+    s = np.zeros(N_JOINTS)
+    for name, angle in degrees.items():
+        indices = [
+            i for i, joint in enumerate(JOINT_NAMES) if joint in (name, f"l_{name}", f"r_{name}")
+        ]
+        if not indices:
+            raise KeyError(name)
+        s[indices] = math.radians(angle)
+    return _frozen(s)
+
+
+CROUCH = posture(
+    hip_pitch=75.2,
+    knee=-111.7,
+    ankle_pitch=-46.4,
+    torso_pitch=20.0,
+    shoulder_pitch=-17.2,
+    shoulder_roll=14.3,
+    elbow=45.8,
+)
+"""Posture the jump starts from: CoM at 0.39 m, 2 cm before the middle of the ankles."""
+
+UNSHIFTED_CROUCH = posture(
+    hip_pitch=68.0,
+    knee=-92.0,
+    ankle_pitch=-34.0,
+    torso_pitch=20.0,
+    shoulder_pitch=-17.2,
+    shoulder_roll=14.3,
+    elbow=45.8,
+)
+"""The same with the ankle range as it came: CoM at 0.43 m, so less room to accelerate."""
+
+LANDING = posture(
+    hip_pitch=54.7,
+    knee=-76.0,
+    ankle_pitch=-31.3,
+    torso_pitch=5.0,
+    shoulder_pitch=-17.2,
+    shoulder_roll=14.3,
+    elbow=45.8,
+)
+"""Posture of flight and landing: feet retracted, stable at touch-down (section III-C)."""
+
+
+def crouch(ankle_shift: bool = True) -> NDArray[np.float64]:
+    """(23,) posture (rad) the jump starts from, with or without the shifted ankles."""
+    return CROUCH if ankle_shift else UNSHIFTED_CROUCH

@@ -1,0 +1,195 @@
+"""The iCub on a floor as a MuJoCo model."""
+
+from __future__ import annotations
+
+import math
+from xml.sax.saxutils import quoteattr
+
+import mujoco
+import numpy as np
+
+from icub_jump_env.robot import facts
+from icub_jump_env.robot.urdf import load_urdf, mesh_root
+
+FLOOR_GEOM = "floor"
+CAMERA = "side"
+COLLISION_GROUP = 3
+VISUAL_GROUP = 2
+
+_FLOOR_COLORS = ((0.86, 0.87, 0.89), (0.78, 0.80, 0.83))
+_BOX_COLOR = (0.45, 0.55, 0.7, 1.0)
+
+
+def sole_geom(side: str) -> str:
+    """Name of the sole's contact box, ``side`` being ``"l"`` or ``"r"``."""
+    return f"{side}_sole_contact"
+
+
+def build_model(
+    timestep: float, ankle_shift: bool = True, visuals: bool = False
+) -> mujoco.MjModel:
+    """Compile the iCub with a free base, one motor per joint, on a flat floor.
+
+    Links keep their URDF names; body 1 is the base with the free joint. Each joint
+    ``name`` has a torque motor of the same name, so ``data.ctrl`` is the vector of
+    joint torques (Nm) in joint order, clamped at the effort limits.
+
+    Args:
+        timestep: Physics step (s).
+        ankle_shift: Move the ankle pitch range by -15 deg, as the paper did.
+        visuals: Load the iCub's meshes. They have no effect on the dynamics.
+
+    Returns:
+        The compiled model.
+    """
+    # Without these settings MuJoCo merges welded links and drops visual meshes and their folders.
+    compiler = (
+        '<mujoco><compiler fusestatic="false" discardvisual="false" strippath="false" '
+        f"meshdir={quoteattr(str(mesh_root()))}/></mujoco>"
+    )
+    urdf = load_urdf(ankle_shift, visuals).replace("</robot>", f"{compiler}</robot>")
+    spec = mujoco.MjSpec.from_string(urdf)
+    spec.option.timestep = timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+
+    for geom in spec.geoms:
+        geom.contype = 0
+        geom.conaffinity = 0
+        geom.group = VISUAL_GROUP
+    spec.body(facts.BASE_LINK).add_freejoint(name="base")
+    _add_contact_geometry(spec)
+    _add_motors(spec)
+    _add_sensors(spec)
+    _add_scenery(spec)
+    return spec.compile()
+
+
+def _add_contact_geometry(spec: mujoco.MjSpec) -> None:
+    # The robot's geoms collide with the floor only, not with each other.
+    spec.worldbody.add_geom(
+        name=FLOOR_GEOM,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0.0, 0.0, 0.5],
+        contype=1,
+        conaffinity=0,
+        friction=[facts.FEET_FRICTION, 0.005, 0.0001],
+        material="floor",
+    )
+    sole = facts.SOLE
+    half_thickness = 0.004
+    for side, frame in zip("lr", facts.SOLE_FRAMES, strict=True):
+        spec.body(frame).add_geom(
+            name=sole_geom(side),
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[sole.center_x, 0.0, sole.bottom + half_thickness],
+            size=[sole.half_length, sole.half_width, half_thickness],
+            contype=0,
+            conaffinity=1,
+            mass=0.0,
+            friction=[facts.FEET_FRICTION, 0.005, 0.0001],
+            group=COLLISION_GROUP,
+            rgba=_BOX_COLOR,
+        )
+    for link, (center, half_size) in facts.BODY_BOXES.items():
+        spec.body(link).add_geom(
+            name=f"{link}_contact",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=center,
+            size=half_size,
+            contype=0,
+            conaffinity=1,
+            mass=0.0,
+            group=COLLISION_GROUP,
+            rgba=_BOX_COLOR,
+        )
+
+
+def _add_motors(spec: mujoco.MjSpec) -> None:
+    for name, motor in zip(facts.JOINT_NAMES, facts.MOTORS, strict=True):
+        spec.joint(name).armature = motor.armature
+        actuator = spec.add_actuator(
+            name=name,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target=name,
+            ctrllimited=True,
+            ctrlrange=[-motor.effort, motor.effort],
+            forcelimited=True,
+            forcerange=[-motor.effort, motor.effort],
+        )
+        actuator.set_to_motor()
+
+
+def _add_sensors(spec: mujoco.MjSpec) -> None:
+    body = mujoco.mjtObj.mjOBJ_BODY
+    sensor = mujoco.mjtSensor
+    for name, kind in (
+        ("com", sensor.mjSENS_SUBTREECOM),
+        ("com_velocity", sensor.mjSENS_SUBTREELINVEL),
+        ("angular_momentum", sensor.mjSENS_SUBTREEANGMOM),
+    ):
+        spec.add_sensor(name=name, type=kind, objtype=body, objname=facts.BASE_LINK)
+    # The base faces its own -x; the IMU frame is turned to face forward.
+    half_yaw = facts.BASE_YAW / 2
+    spec.body(facts.BASE_LINK).add_site(
+        name="imu", quat=[math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw)]
+    )
+    spec.add_sensor(
+        name="base_gyro",
+        type=sensor.mjSENS_GYRO,
+        objtype=mujoco.mjtObj.mjOBJ_SITE,
+        objname="imu",
+    )
+    geom = mujoco.mjtObj.mjOBJ_GEOM
+    field = mujoco.mjtConDataField
+    found_and_force = (1 << int(field.mjCONDATA_FOUND)) | (1 << int(field.mjCONDATA_FORCE))
+    net_force, one_slot = 3, 1
+    for side in "lr":
+        spec.add_sensor(
+            name=f"{side}_sole_force",
+            type=sensor.mjSENS_CONTACT,
+            objtype=geom,
+            objname=FLOOR_GEOM,
+            reftype=geom,
+            refname=sole_geom(side),
+            intprm=[found_and_force, net_force, one_slot],
+        )
+    spec.add_sensor(
+        name="floor_force",
+        type=sensor.mjSENS_CONTACT,
+        objtype=geom,
+        objname=FLOOR_GEOM,
+        intprm=[found_and_force, net_force, one_slot],
+    )
+
+
+def _add_scenery(spec: mujoco.MjSpec) -> None:
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.95, 0.96, 0.98],
+        rgb2=[0.75, 0.80, 0.88],
+        width=256,
+        height=1536,
+    )
+    spec.add_texture(
+        name="floor",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=_FLOOR_COLORS[0],
+        rgb2=_FLOOR_COLORS[1],
+        width=256,
+        height=256,
+    )
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
+    spec.visual.quality.offsamples = 4
+    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
+    material = spec.add_material(name="floor", texuniform=True, texrepeat=[5, 5])
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
+    spec.worldbody.add_light(pos=[0.5, -1.0, 3.0], dir=[-0.15, 0.3, -1.0], castshadow=False)
+    spec.worldbody.add_light(pos=[2.0, 2.0, 2.0], dir=[-0.6, -0.6, -0.5], castshadow=False)
+    camera = spec.worldbody.add_camera(name=CAMERA, pos=[0.55, -1.75, 0.62])
+    camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
+    camera.alt.xyaxes = np.array([0.95, 0.31, 0.0, -0.04, 0.12, 0.99])

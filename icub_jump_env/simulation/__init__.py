@@ -1,0 +1,1 @@
+"""The simulated robot: physics, joint servos, sensors, ground truth, pictures."""

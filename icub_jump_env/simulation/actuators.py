@@ -1,0 +1,96 @@
+"""Low-level joint control: from joint commands to joint torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.control.command import JointCommand
+from icub_jump_env.robot import facts
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ServoGains:
+    """Gains of the joint servos.
+
+    Attributes:
+        stiffness: Torque per position error (Nm/rad); in velocity control per
+            integrated velocity error.
+        damping: Torque per velocity error (Nm s/rad).
+        speed_band: Over this share of the speed limit, above it, the available torque
+            falls to zero.
+    """
+
+    stiffness: float = 1500.0
+    damping: float = 50.0
+    speed_band: float = 0.03
+
+
+class JointServo:
+    """PD control on a position that moves with the commanded velocity.
+
+    In velocity control the servo integrates the command itself, which makes it a PI
+    velocity servo. Its position error is kept within what the effort limit can
+    use, so that it does not wind up. Above the speed limit it gives less and less
+    torque in the direction of motion, and none at 1.03 times the limit. Runs at each
+    physics step.
+    """
+
+    def __init__(self, dt: float, gains: ServoGains | None = None) -> None:
+        """Set up the servo.
+
+        Args:
+            dt: Physics step (s).
+            gains: Gains; the defaults if ``None``.
+        """
+        gains = gains or ServoGains()
+        self._dt = dt
+        self._stiffness = gains.stiffness
+        self._damping = gains.damping
+        self._effort = facts.EFFORT_LIMIT
+        band = gains.speed_band * facts.VELOCITY_LIMIT
+        self._droop = facts.EFFORT_LIMIT / band
+        self._droop_torque = self._droop * (facts.VELOCITY_LIMIT + band)
+        self._largest_error = facts.EFFORT_LIMIT / gains.stiffness
+        self._reference = np.zeros(facts.N_JOINTS)
+        self._velocity = np.zeros(facts.N_JOINTS)
+        self._torque = np.zeros(facts.N_JOINTS)
+
+    def reset(self, joint_position: Array, torque: Array) -> None:
+        """Hold ``joint_position`` ((23,) rad) with ``torque`` ((23,) Nm)."""
+        self._reference[:] = joint_position + torque / self._stiffness
+        self._velocity[:] = 0.0
+
+    def command(self, command: JointCommand) -> None:
+        """Take a new command."""
+        self._velocity[:] = command.velocity
+        if command.position is not None:
+            self._reference[:] = command.position
+
+    def torque(self, joint_position: Array, joint_velocity: Array) -> Array:
+        """Advance by one physics step.
+
+        Args:
+            joint_position: (23,) rad.
+            joint_velocity: (23,) rad/s.
+
+        Returns:
+            (23,) joint torques (Nm) within the effort limits; a buffer that the next
+            call overwrites.
+        """
+        reference = self._reference
+        reference += self._velocity * self._dt
+        error = reference - joint_position
+        np.clip(error, -self._largest_error, self._largest_error, out=error)
+        np.add(error, joint_position, out=reference)
+        torque = self._torque
+        np.multiply(error, self._stiffness, out=torque)
+        torque += self._damping * (self._velocity - joint_velocity)
+        braking = self._droop * joint_velocity
+        upper = np.minimum(self._effort, self._droop_torque - braking)
+        lower = np.maximum(-self._effort, -self._droop_torque - braking)
+        return np.clip(torque, lower, upper, out=torque)

@@ -1,0 +1,76 @@
+"""The true state, read from MuJoCo after each physics step."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from icub_jump_env.metrics.state import TrueState
+from icub_jump_env.robot import facts
+from icub_jump_env.robot.mujoco_model import sole_geom
+from icub_jump_env.simulation.physics import Physics
+
+
+class GroundTruth:
+    """Keeps one :class:`TrueState` up to date with the physics.
+
+    ``mj_step`` evaluates positions, velocities and forces at the beginning of the step
+    and then integrates. All entries are those of that instant, so that heights,
+    momenta and forces belong together.
+
+    Attributes:
+        state: The true state; its arrays are views of MuJoCo's.
+    """
+
+    def __init__(self, physics: Physics) -> None:
+        self._physics = physics
+        model, data = physics.model, physics.data
+        self._timestep = model.opt.timestep
+        self.state = TrueState(
+            com=data.sensor("com").data,
+            com_velocity=data.sensor("com_velocity").data,
+            angular_momentum=data.sensor("angular_momentum").data,
+            joint_position=physics.joint_position,
+            joint_velocity=physics.joint_velocity,
+            joint_torque=data.actuator_force,
+        )
+        self._floor = data.sensor("floor_force").data
+        self._soles_touching = [data.sensor(f"{side}_sole_force").data for side in "lr"]
+        # Body 1 heads the kinematic tree: its composite inertia is about the CoM.
+        self._composite_inertia = data.crb[1]
+        self._base_rotation = data.xmat[model.body(facts.BASE_LINK).id]
+        self._chest_rotation = data.xmat[model.body(facts.CHEST_LINK).id]
+        self._soles = [
+            (data.geom_xpos[geom], data.geom_xmat[geom], model.geom_size[geom])
+            for geom in (model.geom(sole_geom(side)).id for side in "lr")
+        ]
+
+    def __reduce__(self) -> tuple[type[GroundTruth], tuple[Physics]]:
+        # Views of MuJoCo's arrays have to be taken anew from a copy's own data.
+        return GroundTruth, (self._physics,)
+
+    def read(self) -> TrueState:
+        """Update the state after a physics step."""
+        state = self.state
+        state.time = self._physics.data.time - self._timestep
+        # MuJoCo reports the force of the first geom, the floor, on the robot.
+        state.ground_force = float(self._floor[3])
+        n_soles = self._soles_touching[0][0] + self._soles_touching[1][0]
+        state.only_feet_touch = bool(self._floor[0] == n_soles)
+        state.sole_height = min(_lowest_corner(*sole) for sole in self._soles)
+        state.base_pitch = math.asin(min(1.0, max(-1.0, self._base_rotation[6])))
+        state.chest_tilt = math.acos(
+            min(1.0, max(-1.0, float(self._chest_rotation[6:] @ _CHEST_UP)))
+        )
+        xx, yy, zz, xy, xz, yz = self._composite_inertia[:6]
+        state.locked_inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return state
+
+
+_CHEST_UP = np.array([0.0, 1.0, 0.0])
+"""The chest's up axis in its own link frame."""
+
+
+def _lowest_corner(position: np.ndarray, rotation: np.ndarray, half_size: np.ndarray) -> float:
+    return float(position[2] - np.abs(rotation[6:]) @ half_size)

@@ -1,0 +1,90 @@
+"""The simulated world: one iCub on a floor, stepped by MuJoCo."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.robot.mujoco_model import build_model
+
+Array = NDArray[np.float64]
+
+
+class Physics:
+    """One iCub on a floor.
+
+    The state is written in :meth:`reset` alone; after it forces enter only as joint
+    torques through ``data.ctrl``.
+
+    Attributes:
+        model: The MuJoCo model.
+        data: The MuJoCo data.
+        joint_position: (23,) live view of the joint positions (rad).
+        joint_velocity: (23,) live view of the joint velocities (rad/s).
+    """
+
+    def __init__(self, timestep: float, ankle_shift: bool = True, visuals: bool = False) -> None:
+        self.model = build_model(timestep, ankle_shift, visuals)
+        self.data = mujoco.MjData(self.model)
+        self._bind()
+
+    def _bind(self) -> None:
+        data = self.data
+        self.joint_position = data.qpos[7:]
+        self.joint_velocity = data.qvel[6:]
+        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._warnings = data.warning.number
+        self._advanced = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The rest are views, which a copy must take anew of its own data.
+        return {"model": self.model, "data": self.data, "advanced": self._advanced}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.model, self.data = state["model"], state["data"]
+        self._bind()
+        self._advanced = state["advanced"]
+
+    def reset(self, base_position: Array, base_quaternion: Array, joint_position: Array) -> None:
+        """Put the robot at rest.
+
+        Args:
+            base_position: (3,) position of ``root_link`` (m, world).
+            base_quaternion: (4,) orientation of ``root_link``, wxyz.
+            joint_position: (23,) rad.
+        """
+        mujoco.mj_resetData(self.model, self.data)
+        self._qpos[:3] = base_position
+        self._qpos[3:7] = base_quaternion
+        self._qpos[7:] = joint_position
+        mujoco.mj_forward(self.model, self.data)
+        self._advanced = True
+
+    def restart_clock(self) -> None:
+        """Set the time to zero, as the last part of a reset."""
+        self.data.time = 0.0
+
+    def step(self, torque: Array) -> None:
+        """Advance by one physics step under (23,) joint torques (Nm)."""
+        data = self.data
+        self._ctrl[:] = torque
+        before = data.time
+        mujoco.mj_step(self.model, data)
+        self._advanced = data.time > before
+
+    @property
+    def diverged(self) -> bool:
+        """Whether the simulation cannot be trusted any more.
+
+        MuJoCo resets itself when its state becomes NaN or huge, after which everything
+        is finite again; only its warnings and a clock that did not advance tell.
+        """
+        return (
+            not self._advanced
+            or bool(self._warnings.any())
+            or not math.isfinite(self._qpos.sum() + self._qvel.sum())
+        )

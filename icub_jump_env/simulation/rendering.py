@@ -1,0 +1,110 @@
+"""Pictures of the simulation."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any, Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.errors import MissingDependencyError
+from icub_jump_env.robot.mujoco_model import CAMERA
+from icub_jump_env.simulation.physics import Physics
+
+HEIGHT, WIDTH = 480, 640
+
+_NO_GL = (
+    "no OpenGL to render with; on a machine without a display install libegl1 and libgl1 "
+    "(Debian names) and set MUJOCO_GL=egl before Python starts"
+)
+
+
+class Renderer(Protocol):
+    """Shows the present state of a physics."""
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Show the present state; a (height, width, 3) picture or None."""
+        ...
+
+    def close(self) -> None:
+        """Free window and graphics memory."""
+        ...
+
+
+def has_display() -> bool:
+    """Whether a window can be opened."""
+    if not sys.platform.startswith("linux"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def make_renderer(physics: Physics, mode: str) -> Renderer:
+    """A renderer for ``rgb_array`` or ``human``.
+
+    Raises:
+        MissingDependencyError: If there is no OpenGL, or no display for a window.
+    """
+    return WindowRenderer(physics) if mode == "human" else PictureRenderer(physics)
+
+
+class PictureRenderer:
+    """Renders off screen; opens its graphics context with the first picture."""
+
+    def __init__(self, physics: Physics, height: int = HEIGHT, width: int = WIDTH) -> None:
+        self._physics = physics
+        self._height, self._width = height, width
+        self._renderer: Any = None
+
+    def render(self) -> NDArray[np.uint8]:
+        """A picture of the present state, (height, width, 3)."""
+        if self._renderer is None:
+            self._renderer = self._open()
+        self._renderer.update_scene(self._physics.data, CAMERA)
+        picture: NDArray[np.uint8] = self._renderer.render()
+        return picture
+
+    def _open(self) -> Any:
+        if not has_display() and os.environ.get("MUJOCO_GL", "") in ("", "glfw"):
+            raise MissingDependencyError(_NO_GL)
+        try:
+            return mujoco.Renderer(self._physics.model, self._height, self._width)
+        except Exception as error:  # each GL backend has exceptions of its own
+            raise MissingDependencyError(f"{_NO_GL} ({error})") from error
+
+    def close(self) -> None:
+        """Free the graphics context."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+class WindowRenderer:
+    """Shows the state in MuJoCo's interactive viewer."""
+
+    def __init__(self, physics: Physics) -> None:
+        self._physics = physics
+        self._viewer: Any = None
+
+    def render(self) -> None:
+        """Bring the window up to date."""
+        if self._viewer is None:
+            self._viewer = self._open()
+        self._viewer.sync()
+
+    def _open(self) -> Any:
+        if not has_display():
+            raise MissingDependencyError(
+                "render_mode='human' needs a display; use render_mode='rgb_array' instead"
+            )
+        import mujoco.viewer  # imports GLFW, which complains without a display
+
+        return mujoco.viewer.launch_passive(self._physics.model, self._physics.data)
+
+    def close(self) -> None:
+        """Close the window."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
