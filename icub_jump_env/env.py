@@ -30,6 +30,7 @@ from icub_jump_env.simulation.ground_truth import GroundTruth
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.rendering import Renderer, make_renderer
 from icub_jump_env.simulation.sensors import Sensors
+from icub_jump_env.snapshot import Snapshot
 
 FALLEN_TILT = math.radians(60.0)
 """Chest tilt (rad) beyond which the robot has fallen."""
@@ -227,6 +228,25 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             gymnasium.logger.warn("render() needs render_mode='rgb_array' or 'human' in make().")
             return None
         return self._renderer.render()
+
+    def snapshot(self) -> Snapshot:
+        """True state, reference and command at the present instant, for logs and figures."""
+        truth = self._truth.read()
+        launching = self._controller.phases.phase is Phase.LAUNCH
+        reference = self._controller.reference.position if launching else np.full(3, np.nan)
+        return Snapshot(
+            time=truth.time,
+            phase=self._controller.phases.phase.name.lower(),
+            joint_position=truth.joint_position.copy(),
+            joint_velocity=truth.joint_velocity.copy(),
+            joint_velocity_command=self._servo.velocity_command.copy(),
+            joint_torque=truth.joint_torque.copy(),
+            com=truth.com.copy(),
+            com_velocity=truth.com_velocity.copy(),
+            com_reference=reference.copy(),
+            base_pitch=truth.base_pitch,
+            ground_force=truth.ground_force,
+        )
 
     def close(self) -> None:
         """Free the renderer."""

@@ -19,13 +19,13 @@ class InvalidValueError(ICubJumpError, ValueError):
     """
 
     def __init__(self, field: str, value: Any, allowed: str) -> None:
-        super().__init__(field, value, allowed)
+        super().__init__(f"{field}={value!r} is not allowed: {allowed}")
         self.field = field
         self.value = value
         self.allowed = allowed
 
-    def __str__(self) -> str:
-        return f"{self.field}={self.value!r} is not allowed: {self.allowed}"
+    def __reduce__(self) -> tuple[type[InvalidValueError], tuple[str, Any, str]]:
+        return type(self), (self.field, self.value, self.allowed)
 
 
 class ConfigError(InvalidValueError):

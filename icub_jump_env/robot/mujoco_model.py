@@ -7,6 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from icub_jump_env.robot import facts
 from icub_jump_env.robot.urdf import load_urdf, mesh_root
@@ -188,8 +189,17 @@ def _add_scenery(spec: mujoco.MjSpec) -> None:
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     material = spec.add_material(name="floor", texuniform=True, texrepeat=[5, 5])
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
-    spec.worldbody.add_light(pos=[0.5, -1.0, 3.0], dir=[-0.15, 0.3, -1.0], castshadow=False)
-    spec.worldbody.add_light(pos=[2.0, 2.0, 2.0], dir=[-0.6, -0.6, -0.5], castshadow=False)
-    camera = spec.worldbody.add_camera(name=CAMERA, pos=[0.55, -1.75, 0.62])
+    for direction in ((-0.4, 0.6, -1.0), (-0.3, -0.8, -0.6)):
+        light = spec.worldbody.add_light(pos=[0.0, 0.0, 3.0], dir=direction, castshadow=False)
+        light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        light.diffuse = [0.5, 0.5, 0.5]
+    position, target = np.array([1.15, -1.55, 0.72]), np.array([0.05, 0.0, 0.47])
+    camera = spec.worldbody.add_camera(name=CAMERA, pos=position, fovy=38.0)
     camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
-    camera.alt.xyaxes = np.array([0.95, 0.31, 0.0, -0.04, 0.12, 0.99])
+    camera.alt.xyaxes = _camera_axes(target - position)
+
+
+def _camera_axes(view: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Right and up axis of an upright camera that looks along ``view``."""
+    right = np.cross(view, [0.0, 0.0, 1.0])
+    return np.concatenate((right, np.cross(right, view)))

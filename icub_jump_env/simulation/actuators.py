@@ -38,6 +38,9 @@ class JointServo:
     use, so that it does not wind up. Above the speed limit it gives less and less
     torque in the direction of motion, and none at 1.03 times the limit. Runs at each
     physics step.
+
+    Attributes:
+        velocity_command: (23,) latest commanded joint velocities (rad/s).
     """
 
     def __init__(self, dt: float, gains: ServoGains | None = None) -> None:
@@ -57,17 +60,17 @@ class JointServo:
         self._droop_torque = self._droop * (facts.VELOCITY_LIMIT + band)
         self._largest_error = facts.EFFORT_LIMIT / gains.stiffness
         self._reference = np.zeros(facts.N_JOINTS)
-        self._velocity = np.zeros(facts.N_JOINTS)
+        self.velocity_command = np.zeros(facts.N_JOINTS)
         self._torque = np.zeros(facts.N_JOINTS)
 
     def reset(self, joint_position: Array, torque: Array) -> None:
         """Hold ``joint_position`` ((23,) rad) with ``torque`` ((23,) Nm)."""
         self._reference[:] = joint_position + torque / self._stiffness
-        self._velocity[:] = 0.0
+        self.velocity_command[:] = 0.0
 
     def command(self, command: JointCommand) -> None:
         """Take a new command."""
-        self._velocity[:] = command.velocity
+        self.velocity_command[:] = command.velocity
         if command.position is not None:
             self._reference[:] = command.position
 
@@ -83,13 +86,13 @@ class JointServo:
             call overwrites.
         """
         reference = self._reference
-        reference += self._velocity * self._dt
+        reference += self.velocity_command * self._dt
         error = reference - joint_position
         np.clip(error, -self._largest_error, self._largest_error, out=error)
         np.add(error, joint_position, out=reference)
         torque = self._torque
         np.multiply(error, self._stiffness, out=torque)
-        torque += self._damping * (self._velocity - joint_velocity)
+        torque += self._damping * (self.velocity_command - joint_velocity)
         braking = self._droop * joint_velocity
         upper = np.minimum(self._effort, self._droop_torque - braking)
         lower = np.maximum(-self._effort, -self._droop_torque - braking)

@@ -41,6 +41,16 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
+def check_offscreen() -> None:
+    """Refuse early if MuJoCo would look for a display that is not there.
+
+    Raises:
+        MissingDependencyError: Naming the remedy.
+    """
+    if not has_display() and os.environ.get("MUJOCO_GL", "") in ("", "glfw"):
+        raise MissingDependencyError(_NO_GL)
+
+
 def make_renderer(physics: Physics, mode: str) -> Renderer:
     """A renderer for ``rgb_array`` or ``human``.
 
@@ -67,8 +77,7 @@ class PictureRenderer:
         return picture
 
     def _open(self) -> Any:
-        if not has_display() and os.environ.get("MUJOCO_GL", "") in ("", "glfw"):
-            raise MissingDependencyError(_NO_GL)
+        check_offscreen()
         try:
             return mujoco.Renderer(self._physics.model, self._height, self._width)
         except Exception as error:  # each GL backend has exceptions of its own

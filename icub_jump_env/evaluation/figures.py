@@ -1,0 +1,151 @@
+"""The paper's figures 1, 2 and 6, redrawn from our simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
+from icub_jump_env.robot import facts
+from icub_jump_env.snapshot import Snapshot
+
+MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"
+
+Trace = Sequence[Snapshot]
+
+
+def draw_figures(folder: Path, config: JumpConfig, with_: Trace, without: Trace) -> list[Path]:
+    """Write the figures as PNG files.
+
+    Args:
+        folder: Where to write them; made if missing.
+        config: The jump's configuration.
+        with_: Trace with the momentum constraint.
+        without: Trace without it.
+
+    Returns:
+        The files written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for name, figure in (
+        ("fig1_com_reference", com_reference_figure(config)),
+        ("fig2_launch", launch_figure(config, with_)),
+        ("fig6_base_pitch", base_pitch_figure(with_, without)),
+    ):
+        file = folder / f"{name}.png"
+        figure.savefig(file)
+        files.append(file)
+    return files
+
+
+def com_reference_figure(config: JumpConfig) -> Figure:
+    """Fig. 1: vertical CoM reference, velocity and acceleration."""
+    trajectory = _trajectory(config)
+    time = np.linspace(0.0, trajectory.duration, 400)
+    samples = [trajectory.sample(t) for t in time]
+    figure, (velocity, acceleration) = _figure(1, 2, (8.0, 3.2))
+    velocity.plot(time, [s.velocity for s in samples], color=DESIRED)
+    _label(velocity, "vertical CoM velocity", "m/s")
+    acceleration.plot(time, [s.acceleration for s in samples], color=DESIRED)
+    _label(acceleration, "vertical CoM acceleration", "m/s²")
+    figure.suptitle(
+        f"Fig. 1: CoM reference, {config.jump_height * 100:.3g} cm jump, "
+        f"{trajectory.displacement * 100:.3g} cm displacement"
+    )
+    return figure
+
+
+def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
+    """Fig. 2: joint velocities and CoM height, desired and measured."""
+    duration = _trajectory(config).duration
+    time = np.array([s.time for s in trace])
+    figure, axes = _figure(1, 4, (13.0, 3.4))
+    launch = time <= duration
+    for axis, joint in zip(axes, ("ankle_pitch", "knee", "hip_pitch"), strict=False):
+        index = facts.JOINT_INDEX[f"l_{joint}"]
+        measured = np.array([s.joint_velocity[index] for s in trace])
+        # A snapshot holds the command that led to it, issued one control period before.
+        desired = np.array([s.joint_velocity_command[index] for s in trace[1:]])
+        axis.plot(time[launch], measured[launch], color=MEASURED, label="measured")
+        axis.plot(
+            time[:-1][launch[1:]], desired[launch[1:]], color=DESIRED, ls="--", label="desired"
+        )
+        limit = facts.VELOCITY_LIMIT[index]
+        peak = float(np.abs(measured[launch]).max())
+        if peak > 0.8 * limit:
+            sign = np.sign(measured[launch][-1])
+            axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":", label="limit")
+        _label(axis, f"left {joint.replace('_', ' ')}", "rad/s")
+    axes[0].legend(frameon=False)
+
+    height = axes[3]
+    end = duration + 0.6
+    shown = time <= end
+    com = np.array([s.com[2] for s in trace])
+    reference = np.array([s.com_reference[2] for s in trace])
+    height.plot(time[shown], com[shown], color=MEASURED)
+    height.plot(time[shown], reference[shown], color=DESIRED, ls="--")
+    height.axvline(duration, color=ACCENT, lw=0.8, ls=":")
+    height.annotate("T", (duration, com.min()), color=ACCENT, ha="left")
+    _label(height, "CoM height", "m")
+    figure.suptitle(
+        f"Fig. 2: {config.controller} approach, take-off commanded at {duration:.2f} s"
+    )
+    return figure
+
+
+def base_pitch_figure(with_: Trace, without: Trace) -> Figure:
+    """Fig. 6: base pitch with and without the momentum constraint."""
+    figure, (axis,) = _figure(1, 1, (6.5, 3.6))
+    for trace, color, label in (
+        (with_, MEASURED, "with the momentum constraint"),
+        (without, DESIRED, "without"),
+    ):
+        time = np.array([s.time for s in trace])
+        pitch = np.degrees([s.base_pitch for s in trace])
+        axis.plot(time, pitch, color=color, label=label)
+        if trace[-1].phase == "landing" and trace[-1].time < with_[-1].time:
+            axis.plot(time[-1], pitch[-1], "x", color=color)
+            axis.annotate(
+                "falls",
+                (time[-1], pitch[-1]),
+                color=color,
+                xytext=(6, -3),
+                textcoords="offset points",
+            )
+    end = max(without[-1].time, _takeoff(with_) + 0.8)
+    axis.set_xlim(0.0, end)
+    shown = [np.degrees(s.base_pitch) for t in (with_, without) for s in t if s.time <= end]
+    axis.set_ylim(min(shown) - 2.0, max(shown) + 2.0)
+    axis.axvline(_takeoff(with_), color=ACCENT, lw=0.8, ls=":")
+    _label(axis, "base pitch (positive: forward)", "deg")
+    axis.legend(frameon=False)
+    figure.suptitle("Fig. 6: base pitch")
+    return figure
+
+
+def _takeoff(trace: Trace) -> float:
+    return next((s.time for s in trace if s.phase != "launch"), trace[-1].time)
+
+
+def _trajectory(config: JumpConfig) -> ComTrajectory:
+    return plan_com_trajectory(config.jump_height, config.com_displacement, config.com_scaling)
+
+
+def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=size, dpi=150, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False)
+    return figure, list(axes.flat)
+
+
+def _label(axis: Axes, title: str, unit: str) -> None:
+    axis.set_title(title, fontsize=10)
+    axis.set_xlabel("time (s)")
+    axis.set_ylabel(unit)
+    axis.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,65 @@
+"""Writing results: complete or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from icub_jump_env.errors import ConfigError
+
+
+def check_writable(field: str, path: Path, folder: bool = False) -> None:
+    """Refuse an output path before any work is done.
+
+    Args:
+        field: Name of the option, for the error.
+        path: File to be written, or folder to be filled.
+        folder: Whether ``path`` is a folder; it may not exist yet.
+
+    Raises:
+        ConfigError: If nothing can be written there.
+    """
+    if folder:
+        if path.exists() and not path.is_dir():
+            raise ConfigError(field, str(path), "a folder")
+        existing = next(p for p in (path, *path.absolute().parents) if p.exists())
+    else:
+        if path.is_dir():
+            raise ConfigError(field, str(path), "a file, not a folder")
+        existing = path.parent
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        raise ConfigError(field, str(path), "a path in an existing, writable folder")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write strict JSON atomically; NaN, which JSON lacks, becomes null.
+
+    An existing file stays as it is unless the new one is complete.
+    """
+    text = json.dumps(_without_nan(content), indent=2, allow_nan=False)
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    temporary = Path(name)
+    try:
+        with os.fdopen(descriptor, "w") as file:
+            file.write(text + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,28 @@
+"""Where a result comes from: versions, configuration, seed."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+import sys
+from importlib import metadata
+from typing import Any
+
+import icub_jump_env
+from icub_jump_env.config import JumpConfig
+
+_PACKAGES = ("daqp", "gymnasium", "icub-models", "mujoco", "numpy", "osqp", "pin", "scipy")
+
+
+def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
+    """Versions, configuration, seed and command of a result."""
+    return {
+        "versions": {
+            "icub-jump": icub_jump_env.__version__,
+            "python": platform.python_version(),
+            **{package: metadata.version(package) for package in _PACKAGES},
+        },
+        "config": dataclasses.asdict(config),
+        "seed": seed,
+        "command": ["python", *sys.argv],
+    }

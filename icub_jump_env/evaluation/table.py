@@ -1,0 +1,115 @@
+"""The table: paper, ours, difference, and the ablation of the momentum constraint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from icub_jump_env.evaluation.paper import PAPER
+from icub_jump_env.evaluation.rollout import Episode
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity.
+
+    Attributes:
+        quantity: What it is.
+        unit: Unit of the numbers.
+        paper: The paper's value, if it gives one.
+        ours: Median over our episodes with the momentum constraint.
+        difference: Ours minus the paper's.
+        without_momentum: Median over our episodes without the constraint.
+        source: Where the paper's value comes from.
+    """
+
+    quantity: str
+    unit: str
+    paper: float | None
+    ours: float
+    difference: float | None
+    without_momentum: float
+    source: str
+
+
+_CM, _DEG = 100.0, math.degrees(1.0)
+
+_QUANTITIES: tuple[tuple[str, str, str, float, float | None, str], ...] = (
+    ("flight height (CoM)", "flight_height", "cm", _CM, PAPER.flight_height, "simulation"),
+    ("sole height", "sole_height", "cm", _CM, PAPER.sole_height, "simulation"),
+    ("take-off velocity", "takeoff_velocity", "m/s", 1.0, PAPER.takeoff_velocity, "command"),
+    ("take-off time", "takeoff_time", "s", 1.0, PAPER.takeoff_time, "command"),
+    ("ballistic height", "ballistic_height", "cm", _CM, PAPER.ballistic_height, "real robot"),
+    ("rotation in flight", "flight_rotation", "deg", _DEG, None, ""),
+    ("base pitch in flight", "base_pitch_range", "deg", _DEG, None, "Fig. 6"),
+    ("landed and stands", "landed", "%", 100.0, 1.0, "simulation"),
+)
+
+
+def comparison_rows(
+    with_momentum: Sequence[Episode], without_momentum: Sequence[Episode]
+) -> list[Row]:
+    """The rows of the table.
+
+    Args:
+        with_momentum: Episodes with the momentum constraint.
+        without_momentum: Episodes without it.
+
+    Returns:
+        One row per quantity: medians, and a mean for the share that landed.
+    """
+    rows = []
+    for quantity, key, unit, scale, paper, source in _QUANTITIES:
+        reduce = np.mean if key == "landed" else np.median
+        ours, without = (
+            scale * float(reduce([float(episode.jump[key]) for episode in episodes]))
+            for episodes in (with_momentum, without_momentum)
+        )
+        reference = None if paper is None else scale * paper
+        difference = None if reference is None else ours - reference
+        rows.append(Row(quantity, unit, reference, ours, difference, without, source))
+    return rows
+
+
+def render_table(rows: Sequence[Row], title: str) -> Table:
+    """The table for the terminal."""
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for column in ("paper", "ours", "difference", "no eq. 3d"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(
+            f"{row.quantity}, {row.unit}",
+            _number(row.paper),
+            _number(row.ours),
+            _number(row.difference, signed=True),
+            _number(row.without_momentum),
+        )
+    table.caption = (
+        "paper: simulated heights and landing, commanded take-off, ballistic height of the real "
+        "robot; no eq. 3d: ours without the momentum constraint; medians over the episodes"
+    )
+    table.caption_justify = "left"
+    return table
+
+
+def verdict(rows: Sequence[Row]) -> str:
+    """Which arm of the ablation stands, in a sentence."""
+    row = next(row for row in rows if row.quantity.startswith("landed"))
+    stands = {100.0: "stands", 0.0: "falls"}
+    ours, without = (
+        stands.get(share, f"stands in {share:.0f} % of the episodes")
+        for share in (row.ours, row.without_momentum)
+    )
+    return f"With the momentum constraint (3d) the robot {ours}; without it, it {without}."
+
+
+def _number(value: float | None, signed: bool = False) -> str:
+    if value is None or math.isnan(value):
+        return "-"
+    return f"{value:+.3g}" if signed else f"{value:.3g}"

@@ -1,0 +1,79 @@
+"""A video of the jump."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.env import ICubJumpEnv
+from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.evaluation.rollout import make_env, run_episode
+from icub_jump_env.simulation.rendering import check_offscreen
+
+SLOW_MOTION = 4
+"""Playback is this many times slower than real time."""
+
+FRAME_RATE = 25.0
+AFTER_LANDING = 0.6
+"""How much of the standing is shown (s)."""
+
+FORMATS = (".mp4", ".gif")
+
+_REMEDY = "writing video needs the extra 'video': pip install 'icub-jump[video]'"
+
+
+def check_video(file: Path) -> None:
+    """Refuse early if a video cannot be recorded here.
+
+    Raises:
+        ConfigError: If the file's suffix is no video format.
+        MissingDependencyError: Naming the remedy.
+    """
+    if file.suffix.lower() not in FORMATS:
+        raise ConfigError("video", str(file), f"a file name ending in {' or '.join(FORMATS)}")
+    try:
+        import imageio.v3  # noqa: F401 (only to see whether it is there)
+        import imageio_ffmpeg  # noqa: F401
+    except ImportError as error:
+        raise MissingDependencyError(_REMEDY) from error
+    check_offscreen()
+
+
+def record_video(file: Path, config: JumpConfig, seed: int, console: Console) -> None:
+    """Record one jump in slow motion.
+
+    Args:
+        file: Video file; its suffix chooses the format, such as ``.mp4``.
+        config: The jump.
+        seed: Seed of the episode.
+        console: Where the progress is shown.
+
+    Raises:
+        MissingDependencyError: If the extra or OpenGL is missing.
+    """
+    check_video(file)
+    import imageio.v3 as iio
+
+    config = dataclasses.replace(
+        config,
+        render_mode="rgb_array",
+        stand_time=min(config.stand_time, AFTER_LANDING),
+        agent_frequency=FRAME_RATE * SLOW_MOTION,
+    )
+    env = make_env(config)
+    frames = []
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("recording", total=None)
+
+        def shoot(env: ICubJumpEnv) -> None:
+            frames.append(env.render())
+            progress.advance(task)
+
+        run_episode(env, seed, on_step=shoot)
+    env.close()
+    iio.imwrite(file, frames, fps=math.floor(FRAME_RATE))
