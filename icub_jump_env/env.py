@@ -23,6 +23,7 @@ from icub_jump_env.metrics.jump import JointLimits, JumpRecorder
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot import facts
+from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.statics import holding_torque
 from icub_jump_env.simulation.actuators import JointServo
@@ -131,7 +132,9 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             cfg.solver,
         )
         self._controller = JumpController(launch, self._crouch, cfg.control_dt)
-        self._crouch_base, self._crouch_torque = self._plan_crouch()
+        crouch_q = self._crouch_configuration()
+        self._crouch_qpos = mujoco_qpos(crouch_q)
+        self._crouch_torque = holding_torque(crouch_q)
         self._residual_scale = np.array(cfg.residual_scale)
         self._start_com = np.zeros(3)
         self._episode = cfg
@@ -304,23 +307,18 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _settle(self) -> None:
         physics, servo = self._physics, self._servo
-        physics.reset(*self._crouch_base, self._crouch)
+        physics.reset(self._crouch_qpos)
         servo.reset(self._crouch, self._crouch_torque)
         for _ in range(round(SETTLING_TIME / self.config.timestep)):
             physics.step(servo.torque(physics.joint_position, physics.joint_velocity))
         physics.restart_clock()
 
-    def _plan_crouch(
-        self,
-    ) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
-        """Base position and quaternion (wxyz) of the crouch, and the torques to hold it."""
+    def _crouch_configuration(self) -> NDArray[np.float64]:
+        """Pinocchio's configuration (30,) of the crouch with the soles on the floor."""
         kinematics = self._estimator.kinematics
         kinematics.update(self._crouch)
-        rotation = Rotation.from_matrix(kinematics.base_rotation)
-        position = kinematics.base_position.copy()
-        q = np.concatenate((position, rotation.as_quat(), self._crouch))
-        base = position, rotation.as_quat(scalar_first=True)
-        return base, holding_torque(q, self.config.ankle_shift)
+        quaternion = Rotation.from_matrix(kinematics.base_rotation).as_quat()
+        return np.concatenate((kinematics.base_position, quaternion, self._crouch))
 
     def _joint_limits(self) -> JointLimits:
         lower, upper = self._physics.model.jnt_range[1:].T

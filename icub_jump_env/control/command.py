@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,7 @@ from icub_jump_env.control.qp import QPResiduals, QPStatus
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class JointCommand:
+class JointCommand(NamedTuple):
     """Command to the joint servos, valid until the next control tick.
 
     Attributes:
@@ -26,8 +25,7 @@ class JointCommand:
     position: Array | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class QPReport:
+class QPReport(NamedTuple):
     """How the QP of a control tick went.
 
     Attributes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,7 @@ def landing_posture(crouch: Array, displacement: float) -> Array:
     return crouch + share * (facts.LANDING - crouch)
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(NamedTuple):
     """Outcome of one control tick.
 
     Attributes:

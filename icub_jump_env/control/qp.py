@@ -10,8 +10,8 @@ upper bounds are equal is an equality.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ class QuadraticProgram:
     """Buffers of one QP of fixed size, rewritten in place at each control tick.
 
     Attributes:
+        n: Number of variables.
         H: (n, n) Hessian, positive definite.
         g: (n,) gradient.
         C: (m, n) constraint rows.
@@ -38,12 +39,8 @@ class QuadraticProgram:
         self.C = np.zeros((m, n))
         self.lower = np.zeros(n + m)
         self.upper = np.zeros(n + m)
+        self.n = n
         self.n_equalities = n_equalities
-
-    @property
-    def n(self) -> int:
-        """Number of variables."""
-        return self.g.size
 
 
 class QPStatus(StrEnum):
@@ -56,8 +53,7 @@ class QPStatus(StrEnum):
     """The solver claims success but the residuals exceed the tolerances."""
 
 
-@dataclass(frozen=True, slots=True)
-class QPSolution:
+class QPSolution(NamedTuple):
     """Primal and dual point that a solver returned.
 
     Attributes:
@@ -73,8 +69,7 @@ class QPSolution:
     iterations: int
 
 
-@dataclass(frozen=True, slots=True)
-class QPResiduals:
+class QPResiduals(NamedTuple):
     """How far a point is from optimal, computed without the solver.
 
     Attributes:
@@ -88,8 +83,7 @@ class QPResiduals:
     gap: float
 
 
-@dataclass(frozen=True, slots=True)
-class QPTolerances:
+class QPTolerances(NamedTuple):
     """A solution with larger residuals is not applied."""
 
     primal: float
@@ -107,17 +101,18 @@ def check_solution(problem: QuadraticProgram, solution: QPSolution) -> QPResidua
     Returns:
         The residuals.
     """
-    n, x, multipliers = problem.n, solution.x, solution.multipliers
-    values = np.concatenate((x, problem.C @ x))
+    n, g, x, multipliers = problem.n, problem.g, solution.x, solution.multipliers
+    values = np.concatenate((x, problem.C.dot(x)))
     below, above = problem.lower - values, values - problem.upper
-    primal = max(below.max(), above.max(), 0.0)
+    primal = np.maximum(below, above).max()
 
-    Hx = problem.H @ x
-    stationarity = Hx + problem.g + multipliers[:n] + multipliers[n:] @ problem.C
-    dual = np.abs(stationarity).max() / (1.0 + np.abs(problem.g).max())
+    stationarity = problem.H.dot(x)
+    stationarity += g
+    stationarity += multipliers[:n]
+    stationarity += multipliers[n:].dot(problem.C)
+    dual = np.abs(stationarity).max() / (1.0 + np.abs(g).max())
 
     # At the optimum each multiplier's bound is active; a wrong sign shows here.
     slack = np.where(multipliers > 0, above, below)
-    gx = problem.g @ x
-    gap = abs(multipliers * slack).sum() / (1.0 + abs(gx))
-    return QPResiduals(float(primal), float(dual), float(gap))
+    gap = np.abs(multipliers).dot(np.abs(slack)) / (1.0 + abs(g.dot(x)))
+    return QPResiduals(max(float(primal), 0.0), float(dual), float(gap))

@@ -88,23 +88,28 @@ class VelocityController:
         """
         gains = gains or VelocityGains()
         n = facts.N_JOINTS
-        self.problem = QuadraticProgram(n, n_inequalities=0, n_equalities=6)
-        self._solver = make_solver(solver, self.problem)
+        problem = QuadraticProgram(n, n_inequalities=0, n_equalities=6)
+        self.problem = problem
+        self._solver = make_solver(solver, problem)
         self._gains = gains
         self._dt = dt
-        self._posture = posture
-        self._lower_position, self._upper_position = position_limits
-        self._speed = facts.VELOCITY_LIMIT * gains.velocity_margin
-        self._Lambda = np.array(gains.posture_weight)
-        self._Delta = np.array(gains.smoothness_weight)
         self._momentum_control = momentum_control
-        n_tasks = 6 if momentum_control else 3
-        self._sqrt_weight = np.sqrt(
-            np.repeat((gains.com_weight, gains.momentum_weight), 3)[:n_tasks]
-        )
-        self._tasks = np.zeros((n_tasks, n))
-        self._targets = np.zeros(n_tasks)
-        self._diagonal = np.arange(n)
+        # What does not change from tick to tick is multiplied out here.
+        Lambda = np.array(gains.posture_weight)
+        self._Delta = np.array(gains.smoothness_weight)
+        self._diagonal = Lambda + self._Delta
+        self._posture_weight = Lambda * gains.posture
+        self._posture_pull = self._posture_weight * posture
+        self._speed = facts.VELOCITY_LIMIT * gains.velocity_margin
+        self._slowest = -self._speed
+        self._lower_rate, self._upper_rate = (limit / dt for limit in position_limits)
+        # Rows of the CoM task (3b), then of the momentum constraint (3d).
+        self._rows = 6 if momentum_control else 3
+        weights = np.repeat((gains.com_weight, gains.momentum_weight), 3)
+        self._row_scale = np.sqrt(weights[: self._rows])
+        self._task_scale = np.repeat(self._row_scale[:, None], n, axis=1)
+        self._tasks = np.zeros((self._rows, n))
+        self._targets = np.zeros(self._rows)
         self._previous = np.zeros(n)
         self._momentum_integral = np.zeros(3)
         self.report = _IDLE
@@ -141,12 +146,14 @@ class VelocityController:
             status = QPStatus.REJECTED
         self.report = QPReport(status, residuals, solution.iterations)
 
-        n = facts.N_JOINTS
-        # Keeping on is the best guess when the solver has none. Clipping also takes
-        # the last rounding error off a solution.
-        command = self._previous if self.report.failed else solution.x
-        np.clip(command, self.problem.lower[:n], self.problem.upper[:n], out=self._previous)
-        return self._previous.copy()
+        # Keeping on is the best guess when the solver has none. The limits take the
+        # last rounding error off a solution; fmin and fmax pass over NaN limits.
+        n, command = self.problem.n, self._previous
+        if not self.report.failed:
+            command[:] = solution.x
+        np.fmin(command, self.problem.upper[:n], out=command)
+        np.fmax(command, self.problem.lower[:n], out=command)
+        return command.copy()
 
     def _pose(
         self,
@@ -156,28 +163,31 @@ class VelocityController:
         com_velocity: Array,
     ) -> None:
         gains, problem, kinematics = self._gains, self.problem, estimator.kinematics
-        tasks, targets, weight = self._tasks, self._targets, self._sqrt_weight
-        tasks[:3] = kinematics.J_com
+        tasks, targets = self._tasks, self._targets
+        np.multiply(kinematics.centroidal_map[: self._rows], self._task_scale, out=tasks)
         targets[:3] = com_velocity - gains.com * (estimator.com - com_position)  # (3b)
         if self._momentum_control:
             self._momentum_integral += estimator.angular_momentum * self._dt
-            tasks[3:] = kinematics.J_momentum
             targets[3:] = -gains.momentum * self._momentum_integral  # (3d)
-        tasks *= weight[:, None]
-        targets *= weight
+        targets *= self._row_scale
 
-        Lambda, Delta = self._Lambda, self._Delta
         np.matmul(tasks.T, tasks, out=problem.H)
-        problem.H[self._diagonal, self._diagonal] += Lambda + Delta
-        posture_velocity = -gains.posture * (s - self._posture)
-        problem.g[:] = -(Lambda * posture_velocity + Delta * self._previous + targets @ tasks)
+        problem.H.reshape(-1)[:: problem.n + 1] += self._diagonal
+        g = np.multiply(self._posture_weight, s, out=problem.g)
+        g -= self._posture_pull
+        g -= self._Delta * self._previous
+        g -= targets.dot(tasks)
 
         problem.C[:] = kinematics.J_feet  # (3c)
 
-        n, speed = facts.N_JOINTS, self._speed
-        lower, upper = problem.lower[:n], problem.upper[:n]  # (3e), forward Euler
-        np.clip((self._lower_position - s) / self._dt, -speed, speed, out=lower)
-        np.clip((self._upper_position - s) / self._dt, -speed, speed, out=upper)
+        n, rate = problem.n, s / self._dt
+        for limit, bound in (
+            (self._lower_rate, problem.lower[:n]),
+            (self._upper_rate, problem.upper[:n]),
+        ):
+            np.subtract(limit, rate, out=bound)  # (3e), positions by forward Euler
+            np.minimum(bound, self._speed, out=bound)
+            np.maximum(bound, self._slowest, out=bound)
 
 
 _IDLE = QPReport(QPStatus.SOLVED, QPResiduals(0.0, 0.0, 0.0), 0)

@@ -28,13 +28,16 @@ class FeetFixedEstimator:
     def __init__(self, kinematics: FeetFixedKinematics) -> None:
         self.kinematics = kinematics
         self.com = np.zeros(3)
-        self.com_velocity = np.zeros(3)
-        self.angular_momentum = np.zeros(3)
+        self._rates = np.zeros(6)
+        self.com_velocity, self.angular_momentum = self._rates[:3], self._rates[3:]
+
+    def __reduce__(self) -> tuple[type[FeetFixedEstimator], tuple[FeetFixedKinematics]]:
+        # Every update overwrites all attributes, two of which are views.
+        return FeetFixedEstimator, (self.kinematics,)
 
     def update(self, joint_position: Array, joint_velocity: Array) -> None:
         """Take in encoder readings, (23,) rad and (23,) rad/s."""
         kinematics = self.kinematics
         kinematics.update(joint_position)
         self.com[:] = kinematics.com
-        np.matmul(kinematics.J_com, joint_velocity, out=self.com_velocity)
-        np.matmul(kinematics.J_momentum, joint_velocity, out=self.angular_momentum)
+        np.dot(kinematics.centroidal_map, joint_velocity, out=self._rates)

@@ -53,6 +53,7 @@ class FeetFixedKinematics:
     Attributes:
         mass: Total mass (kg).
         com: (3,) CoM position W_p_CoM (m).
+        centroidal_map: (6, 23) J_com above J_momentum.
         J_com: (3, 23) maps joint velocities to the CoM velocity (m/s), world axes.
         J_momentum: (3, 23) maps joint velocities to the centroidal angular momentum
             H_omega (kg m^2/s), world axes; the angular half of J_M in eq. 2.
@@ -60,6 +61,7 @@ class FeetFixedKinematics:
             to the left one. Both feet are at rest (eq. 3c) where it vanishes.
         base_rotation: (3, 3) orientation of ``root_link`` in the world.
         base_position: (3,) position of ``root_link`` in the world (m).
+        world_M_ankle: ``pinocchio.SE3`` of the left ankle roll joint, which stands still.
     """
 
     def __init__(self, ankle_shift: bool = True) -> None:
@@ -67,39 +69,45 @@ class FeetFixedKinematics:
         self._model = _cached_model(ankle_shift)
         self._data = self._model.createData()
         self._q = pin.neutral(self._model)
-        left, right = (self._model.getFrameId(name) for name in facts.SOLE_FRAMES)
-        self._sole_frames = left, right
-        frame = self._model.frames[left]
-        self._ankle_R_sole = frame.placement.rotation.copy()
-        self._ankle_p_sole = frame.placement.translation.copy()
-
-        # Views of Pinocchio's buffers: reading an attribute costs more than using it.
-        data = self._data
-        self._A_momentum = data.Ag
-        self._J = data.J
-        self._base_p_com = data.com[0]
-        ankle = data.oMi[frame.parentJoint]
-        self._base_R_ankle, self._base_p_ankle = ankle.rotation, ankle.translation
-
         self.mass = float(pin.computeTotalMass(self._model))
+        self._inverse_mass = 1.0 / self.mass
         self.com = np.zeros(3)
-        self._stacked = np.zeros((2, 3, facts.N_JOINTS))
-        self.J_com, self.J_momentum = self._stacked
+        self.centroidal_map = np.zeros((6, facts.N_JOINTS))
+        self.J_com, self.J_momentum = self.centroidal_map[:3], self.centroidal_map[3:]
         self.J_feet = np.zeros((6, facts.N_JOINTS))
         self.base_rotation = np.eye(3)
         self.base_position = np.zeros(3)
-        self.world_M_sole = self._start_placement()
+
+        ankle = self._place_left_ankle()
+        self._world_R_ankle = self.world_M_ankle.rotation.copy()
+        self._world_p_ankle = self.world_M_ankle.translation.copy()
+        # Views of Pinocchio's buffers: reading an attribute costs more than using it.
+        data = self._data
+        self._A_base, self._A_joints = data.Ag[:, :6], data.Ag[:, 6:]
+        self._J_left, self._J_right = data.J[:, 6:12], data.J[:, 12:18]
+        self._base_p_com = data.com[0]
+        placement = data.oMi[ankle]
+        self._ankle_R_base, self._base_p_ankle = placement.rotation.T, placement.translation
+        self._joint_map = np.zeros((6, facts.N_JOINTS))
+        self._joint_map_left = self._joint_map[:, facts.LEFT_LEG]
 
     def __reduce__(self) -> tuple[type[FeetFixedKinematics], tuple[bool]]:
         # The buffers are views of Pinocchio's; a copy takes its own at its next update.
         return FeetFixedKinematics, (self._ankle_shift,)
 
-    def _start_placement(self) -> Any:
-        """Left sole flat on the floor, the other one mirrored about the x axis."""
-        pin.framesForwardKinematics(self._model, self._data, self._q)
-        left, right = (self._data.oMf[i] for i in self._sole_frames)
-        half_width = abs(float((left.actInv(right)).translation[1])) / 2
-        return pin.SE3(np.eye(3), np.array([0.0, half_width, -facts.SOLE.bottom]))
+    def _place_left_ankle(self) -> int:
+        """Fix the left sole flat on the floor, half the stance width left of the x axis.
+
+        The sole is welded to the last joint of the leg, so that joint stands still too.
+        """
+        model, data = self._model, self._data
+        pin.framesForwardKinematics(model, data, self._q)
+        left, right = (model.getFrameId(name) for name in facts.SOLE_FRAMES)
+        stance_width = abs(data.oMf[left].actInv(data.oMf[right]).translation[1])
+        sole_position = np.array([0.0, stance_width / 2, -facts.SOLE.bottom])
+        frame = model.frames[left]
+        self.world_M_ankle = pin.SE3(np.eye(3), sole_position) * frame.placement.inverse()
+        return int(frame.parentJoint)
 
     def update(self, joint_position: Array) -> None:
         """Recompute all attributes.
@@ -111,19 +119,16 @@ class FeetFixedKinematics:
         # base twist for a left foot at rest is minus the left leg's contribution.
         self._q[7:] = joint_position
         pin.computeCentroidalMap(self._model, self._data, self._q)
-        J_left = self._J[:, 6:12]
-        self.J_feet[:, facts.LEFT_LEG] = J_left
-        self.J_feet[:, facts.RIGHT_LEG] = -self._J[:, 12:18]
+        self.J_feet[:, facts.LEFT_LEG] = self._J_left
+        np.negative(self._J_right, out=self.J_feet[:, facts.RIGHT_LEG])
 
-        sole = self.world_M_sole
-        base_R_sole = self._base_R_ankle @ self._ankle_R_sole
-        base_p_sole = self._base_R_ankle @ self._ankle_p_sole + self._base_p_ankle
-        R = np.matmul(sole.rotation, base_R_sole.T, out=self.base_rotation)
-        self.base_position[:] = sole.translation - R @ base_p_sole
-        np.add(R @ self._base_p_com, self.base_position, out=self.com)
+        R = np.dot(self._world_R_ankle, self._ankle_R_base, out=self.base_rotation)
+        np.subtract(self._world_p_ankle, R.dot(self._base_p_ankle), out=self.base_position)
+        np.add(R.dot(self._base_p_com), self.base_position, out=self.com)
 
-        A = self._A_momentum
-        joint_map = A[:, 6:].copy()
-        joint_map[:, facts.LEFT_LEG] -= A[:, :6] @ J_left
-        joint_map[:3] /= self.mass
-        np.matmul(R, joint_map.reshape(2, 3, facts.N_JOINTS), out=self._stacked)
+        joint_map = self._joint_map
+        joint_map[:] = self._A_joints
+        self._joint_map_left -= self._A_base.dot(self._J_left)
+        np.dot(R, joint_map[:3], out=self.J_com)
+        np.dot(R, joint_map[3:], out=self.J_momentum)
+        self.J_com *= self._inverse_mass

@@ -12,19 +12,18 @@ from icub_jump_env.robot.kinematics import build_pinocchio_model
 Array = NDArray[np.float64]
 
 
-def holding_torque(q: Array, ankle_shift: bool = True) -> Array:
+def holding_torque(q: Array) -> Array:
     """Torques that balance gravity with both soles on the floor.
 
     The contact wrenches are the smallest ones (least norm) that carry the weight.
 
     Args:
         q: (30,) Pinocchio configuration.
-        ankle_shift: Whether the ankle range is shifted.
 
     Returns:
         (23,) joint torques (Nm).
     """
-    model = build_pinocchio_model(ankle_shift)
+    model = build_pinocchio_model()
     data = model.createData()
     gravity = pin.computeGeneralizedGravity(model, data, q)
     jacobians = [

@@ -49,18 +49,10 @@ class Physics:
         self._bind()
         self._advanced = state["advanced"]
 
-    def reset(self, base_position: Array, base_quaternion: Array, joint_position: Array) -> None:
-        """Put the robot at rest.
-
-        Args:
-            base_position: (3,) position of ``root_link`` (m, world).
-            base_quaternion: (4,) orientation of ``root_link``, wxyz.
-            joint_position: (23,) rad.
-        """
+    def reset(self, qpos: Array) -> None:
+        """Put the robot at rest at MuJoCo positions ``qpos``, (30,)."""
         mujoco.mj_resetData(self.model, self.data)
-        self._qpos[:3] = base_position
-        self._qpos[3:7] = base_quaternion
-        self._qpos[7:] = joint_position
+        self._qpos[:] = qpos
         mujoco.mj_forward(self.model, self.data)
         self._advanced = True
 
