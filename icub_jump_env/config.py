@@ -165,10 +165,12 @@ def _number(field: str, value: Any, low: float, high: float) -> float:
 
 
 def _residual_scale(value: Any) -> tuple[float, float, float]:
-    field = "residual_scale"
-    if not hasattr(value, "__len__") or isinstance(value, str) or len(value) != 3:
-        raise ConfigError(field, value, "three numbers (forward, lateral, vertical) in m")
-    x, y, z = (_number(f"{field}[{i}]", v, *RESIDUAL_RANGE) for i, v in enumerate(value))
+    low, high = RESIDUAL_RANGE
+    try:
+        x, y, z = (_number("residual_scale", item, low, high) for item in value)
+    except (TypeError, ValueError):
+        allowed = f"three numbers from {low:g} to {high:g} m: forward, lateral, vertical"
+        raise ConfigError("residual_scale", value, allowed) from None
     return x, y, z
 
 

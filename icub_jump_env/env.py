@@ -138,7 +138,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._residual_scale = np.array(cfg.residual_scale)
         self._start_com = np.zeros(3)
         self._episode = cfg
-        self._outcome = "running"
+        self._outcome = "not reset"
         self._report: QPReport | None = None
         self._observation = np.zeros(observation.SIZE, np.float32)
         self._renderer: Renderer | None = None
@@ -208,7 +208,10 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Raises:
             ActionError: If the action is misshapen, not finite or out of range.
+            gymnasium.error.ResetNeeded: Before the first reset.
         """
+        if self._outcome == "not reset":
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
         action64 = _check_action(action)
         target = action64 * self._residual_scale
         for _ in range(self.config.controls_per_step):
@@ -268,7 +271,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
         physics, sensors = self._physics, self._sensors
-        if physics.diverged:
+        if physics.diverged or not physics.valid:
             self._outcome = "diverged"
             return
         sensors.read()
@@ -311,7 +314,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         servo.reset(self._crouch, self._crouch_torque)
         for _ in range(round(SETTLING_TIME / self.config.timestep)):
             physics.step(servo.torque(physics.joint_position, physics.joint_velocity))
-        physics.restart_clock()
+        physics.start_from_rest()
 
     def _crouch_configuration(self) -> NDArray[np.float64]:
         """Pinocchio's configuration (30,) of the crouch with the soles on the floor."""

@@ -37,10 +37,12 @@ class DAQPSolver:
         rows = problem.lower.size
         self._sense = np.zeros(rows, dtype=np.int32)
         self._sense[rows - problem.n_equalities :] = self._EQUALITY
+        # A failed setup leaves DAQP unusable, so it sees a problem that cannot fail; each
+        # solve replaces all of it.
+        n, m = problem.n, problem.C.shape[0]
+        ones = np.ones(rows)
         self._model = daqp.Model()
-        self._model.setup(
-            problem.H, problem.g, problem.C, problem.upper, problem.lower, self._sense
-        )
+        self._model.setup(np.eye(n), np.zeros(n), np.zeros((m, n)), ones, -ones)
 
     def __reduce__(self) -> tuple[type[DAQPSolver], tuple[QuadraticProgram]]:
         return DAQPSolver, (self._problem,)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,22 @@ POSITION_TOLERANCE = 1e-3
 """... and its position limit beyond this (rad): MuJoCo's limits are slightly soft."""
 MIN_FLIGHT_TIME = 0.1
 MIN_HEIGHT_RATIO = 0.7
+
+
+class _Undefined(float):
+    """A NaN that equals itself, so that equal results compare equal.
+
+    ``math.isnan(x)`` and ``x != x`` still tell it from a number. Gymnasium's checker
+    compares infos with ``==``, which no ordinary NaN survives.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, float) and math.isnan(other)
+
+    __hash__ = float.__hash__
+
+
+UNDEFINED = _Undefined("nan")
 
 
 @dataclass(frozen=True)
@@ -63,16 +79,16 @@ class JumpMetrics:
             beyond its torque or position limit.
     """
 
-    takeoff_time: float = math.nan
-    takeoff_velocity: float = math.nan
-    ballistic_height: float = math.nan
+    takeoff_time: float = UNDEFINED
+    takeoff_velocity: float = UNDEFINED
+    ballistic_height: float = UNDEFINED
     flight_time: float = 0.0
     flight_height: float = 0.0
-    apex_height: float = math.nan
-    sole_height: float = math.nan
-    flight_rotation: float = math.nan
-    base_pitch_range: float = math.nan
-    angular_momentum_takeoff: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    apex_height: float = UNDEFINED
+    sole_height: float = UNDEFINED
+    flight_rotation: float = UNDEFINED
+    base_pitch_range: float = UNDEFINED
+    angular_momentum_takeoff: tuple[float, float, float] = (UNDEFINED, UNDEFINED, UNDEFINED)
     peak_ground_force: float = 0.0
     landed: bool = False
     solver_failures: float = 0.0
@@ -88,7 +104,7 @@ class JumpMetrics:
 
     def as_dict(self) -> dict[str, Any]:
         """The metrics by name."""
-        return asdict(self)
+        return {name: getattr(self, name) for name in self.__slots__}
 
 
 @dataclass(slots=True)

@@ -168,6 +168,7 @@ def plan_com_trajectory(
         trajectory = ComTrajectory(curve, velocity, -velocity * curve.end_slope / GRAVITY)
         if trajectory.displacement > MAX_DISPLACEMENT:
             highest = jump_height * MAX_DISPLACEMENT / trajectory.displacement
+            highest = math.floor(highest * 1000) / 1000
             raise CommandNotScalableError(
                 "jump_height",
                 jump_height,

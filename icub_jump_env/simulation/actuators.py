@@ -94,6 +94,7 @@ class JointServo:
         np.multiply(error, self._stiffness, out=torque)
         torque += self._damping * (self.velocity_command - joint_velocity)
         braking = self._droop * joint_velocity
-        upper = np.minimum(self._effort, self._droop_torque - braking)
-        lower = np.maximum(-self._effort, -self._droop_torque - braking)
-        return np.clip(torque, lower, upper, out=torque)
+        np.minimum(torque, self._droop_torque - braking, out=torque)
+        np.maximum(torque, -self._droop_torque - braking, out=torque)
+        np.minimum(torque, self._effort, out=torque)
+        return np.maximum(torque, -self._effort, out=torque)

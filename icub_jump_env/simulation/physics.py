@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import mujoco
@@ -12,6 +11,9 @@ from numpy.typing import NDArray
 from icub_jump_env.robot.mujoco_model import build_model
 
 Array = NDArray[np.float64]
+
+_HUGE = 1e10
+"""Where MuJoCo, too, stops believing in a position or velocity (mjMAXVAL)."""
 
 
 class Physics:
@@ -38,45 +40,49 @@ class Physics:
         self.joint_velocity = data.qvel[6:]
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self._warnings = data.warning.number
-        self._advanced = True
+        self._last_time = data.time
 
     def __getstate__(self) -> dict[str, Any]:
         # The rest are views, which a copy must take anew of its own data.
-        return {"model": self.model, "data": self.data, "advanced": self._advanced}
+        return {"model": self.model, "data": self.data, "last_time": self._last_time}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.model, self.data = state["model"], state["data"]
         self._bind()
-        self._advanced = state["advanced"]
+        self._last_time = state["last_time"]
 
     def reset(self, qpos: Array) -> None:
         """Put the robot at rest at MuJoCo positions ``qpos``, (30,)."""
         mujoco.mj_resetData(self.model, self.data)
         self._qpos[:] = qpos
         mujoco.mj_forward(self.model, self.data)
-        self._advanced = True
+        self._last_time = 0.0
 
-    def restart_clock(self) -> None:
-        """Set the time to zero, as the last part of a reset."""
-        self.data.time = 0.0
+    def start_from_rest(self) -> None:
+        """Stop all motion and set the time to zero, as the last part of a reset."""
+        self._qvel[:] = 0.0
+        self.data.time = self._last_time = 0.0
+        mujoco.mj_forward(self.model, self.data)
 
     def step(self, torque: Array) -> None:
         """Advance by one physics step under (23,) joint torques (Nm)."""
-        data = self.data
         self._ctrl[:] = torque
-        before = data.time
-        mujoco.mj_step(self.model, data)
-        self._advanced = data.time > before
+        mujoco.mj_step(self.model, self.data)
+        time = self.data.time
+        # Once gone backwards, the clock stays behind this mark.
+        if time > self._last_time:
+            self._last_time = time
 
     @property
     def diverged(self) -> bool:
         """Whether the simulation cannot be trusted any more.
 
         MuJoCo resets itself when its state becomes NaN or huge, after which everything
-        is finite again; only its warnings and a clock that did not advance tell.
+        is finite again; only its warnings and a clock that ran back tell.
         """
-        return (
-            not self._advanced
-            or bool(self._warnings.any())
-            or not math.isfinite(self._qpos.sum() + self._qvel.sum())
-        )
+        return self.data.time != self._last_time or bool(self._warnings.any())
+
+    @property
+    def valid(self) -> bool:
+        """Whether the state is finite and small enough to compute with."""
+        return all(x.max() < _HUGE and x.min() > -_HUGE for x in (self._qpos, self._qvel))

@@ -1,0 +1,50 @@
+"""Fixtures shared by all tests."""
+
+import os
+
+# One thread: the matrices are small, and results must not depend on the machine's load.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
+
+settings.register_profile("ci", deadline=None, derandomize=True, max_examples=50)
+settings.load_profile("ci")
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20190425)
+
+
+@pytest.fixture(autouse=True)
+def in_temporary_folder(tmp_path, monkeypatch):
+    """MuJoCo writes MUJOCO_LOG.TXT into the working folder when a simulation diverges."""
+    monkeypatch.chdir(tmp_path)
+
+
+def jump(**config) -> Episode:
+    env = make_env(JumpConfig(**config))
+    episode = run_episode(env, seed=0)
+    env.close()
+    return episode
+
+
+@pytest.fixture(scope="session")
+def nominal() -> Episode:
+    """The nominal jump with a snapshot at each control tick."""
+    env = make_env(traced(JumpConfig()))
+    episode = run_episode(env, seed=0, trace=True)
+    env.close()
+    return episode
+
+
+@pytest.fixture(scope="session")
+def ablated() -> Episode:
+    """The same without the momentum constraint."""
+    return jump(momentum_control=False)

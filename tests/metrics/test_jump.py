@@ -1,0 +1,218 @@
+"""Jump metrics on synthetic motions whose results are known in closed form."""
+
+import json
+import math
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from icub_jump_env.metrics.jump import GRAVITY, JointLimits, JumpMetrics, JumpRecorder
+from icub_jump_env.metrics.state import TrueState
+
+DT = 1e-3
+WEIGHT = 324.0
+LIMITS = JointLimits(-np.ones(2), np.ones(2), np.full(2, 5.0), np.full(2, 37.0))
+
+
+def state(time, height=0.5, force=WEIGHT, **values):
+    values = {
+        "com": np.array([0.0, 0.0, height]),
+        "joint_position": np.zeros(2),
+        "joint_velocity": np.zeros(2),
+        "joint_torque": np.zeros(2),
+    } | values
+    return TrueState(time=time, ground_force=force, **values)
+
+
+def ballistic(recorder, start, speed, height=0.5, **values):
+    """Fly a parabola from ``height``; return the time and height of the landing."""
+    steps = math.floor(2 * speed / GRAVITY / DT)
+    for i in range(steps + 1):
+        t = i * DT
+        recorder.update(
+            state(
+                start + t,
+                height + speed * t - GRAVITY * t**2 / 2,
+                force=0.0,
+                com_velocity=np.array([0.0, 0.0, speed - GRAVITY * t]),
+                **{k: v(t) if callable(v) else v for k, v in values.items()},
+            )
+        )
+    return start + (steps + 1) * DT
+
+
+def stand(recorder, start, duration, **values):
+    steps = round(duration / DT)
+    for i in range(steps):
+        recorder.update(state(start + i * DT, **values))
+    return start + steps * DT
+
+
+def recorded(speed=0.886, stand_time=0.3, **values):
+    recorder = JumpRecorder(LIMITS, stand_time)
+    time = stand(recorder, 0.0, 0.4)
+    landing = ballistic(recorder, time, speed, **values)
+    stand(recorder, landing, stand_time + 0.01)
+    return recorder
+
+
+@given(st.floats(0.2, 2.0))
+def test_parabola(speed):
+    metrics = recorded(speed).metrics
+    height = speed**2 / (2 * GRAVITY)
+    assert metrics.takeoff_time == pytest.approx(0.4)
+    assert metrics.takeoff_velocity == pytest.approx(speed)
+    assert metrics.ballistic_height == pytest.approx(height)
+    assert metrics.flight_height == pytest.approx(height, abs=GRAVITY * DT**2)
+    assert metrics.apex_height == pytest.approx(0.5 + height, abs=GRAVITY * DT**2)
+    assert metrics.flight_time == pytest.approx(2 * speed / GRAVITY, abs=2 * DT)
+    assert metrics.landed
+
+
+def test_rotation_integrates_the_locked_angular_velocity():
+    inertia = np.array([[2.0, 0.1, 0.0], [0.1, 1.5, 0.2], [0.0, 0.2, 0.7]])
+    velocity = np.array([0.3, -0.8, 0.5])
+    metrics = recorded(locked_inertia=inertia, angular_momentum=inertia @ velocity).metrics
+    assert metrics.flight_rotation == pytest.approx(-0.8 * metrics.flight_time, rel=0.01)
+    assert metrics.angular_momentum_takeoff == pytest.approx(tuple(inertia @ velocity))
+
+
+def test_heights_and_pitch_are_those_in_flight():
+    metrics = recorded(sole_height=lambda t: 0.2 * t, base_pitch=lambda t: 0.1 - t).metrics
+    assert metrics.sole_height == pytest.approx(0.2 * metrics.flight_time, rel=0.01)
+    assert metrics.base_pitch_range == pytest.approx(metrics.flight_time, rel=0.01)
+
+
+def test_nothing_is_defined_without_a_flight():
+    recorder = JumpRecorder(LIMITS, 0.3)
+    stand(recorder, 0.0, 1.0)
+    metrics = recorder.metrics
+    assert metrics.flight_height == metrics.flight_time == 0.0
+    for name in (
+        "takeoff_time",
+        "takeoff_velocity",
+        "ballistic_height",
+        "apex_height",
+        "sole_height",
+        "flight_rotation",
+        "base_pitch_range",
+    ):
+        assert math.isnan(getattr(metrics, name))
+    assert not metrics.landed
+    assert not metrics.is_success(0.04)
+
+
+def test_chatter_before_take_off_does_not_count():
+    """A short loss of contact, lower than the flight: height counts from the last loss."""
+    recorder = JumpRecorder(LIMITS, 0.3)
+    time = stand(recorder, 0.0, 0.4)
+    for i in range(3):
+        recorder.update(state(time + i * DT, 0.5 + 0.8 * i * DT, force=0.0))
+    time = stand(recorder, time + 3 * DT, 5 * DT, height=0.505)
+    landing = ballistic(recorder, time, 0.886, height=0.51)
+    stand(recorder, landing, 0.4)
+    assert recorder.metrics.takeoff_time == pytest.approx(time)
+    assert recorder.metrics.flight_height == pytest.approx(0.04, abs=1e-4)
+    assert recorder.metrics.landed
+
+
+def test_a_bounce_after_landing_does_not_count():
+    recorder = JumpRecorder(LIMITS, 0.3)
+    landing = ballistic(recorder, stand(recorder, 0.0, 0.4), 0.886)
+    time = stand(recorder, landing, 0.05, height=0.46)
+    time = ballistic(recorder, time, 0.3, height=0.46)
+    stand(recorder, time, 0.4)
+    assert recorder.metrics.takeoff_time == pytest.approx(0.4)
+    assert recorder.metrics.takeoff_velocity == pytest.approx(0.886)
+    assert recorder.touchdown_time == pytest.approx(landing)
+
+
+def test_one_newton_is_airborne():
+    for force, height in ((0.99, 0.04), (1.0, 0.0)):
+        recorder = JumpRecorder(LIMITS, 0.3)
+        for i in range(181):
+            t = i * DT
+            recorder.update(state(t, 0.5 + 0.886 * t - GRAVITY * t**2 / 2, force=force))
+        assert recorder.metrics.flight_height == pytest.approx(height, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "values", [{"only_feet_touch": False}, {"chest_tilt": math.radians(31.0)}]
+)
+@pytest.mark.parametrize("when", ["launch", "flight", "landing"])
+def test_not_landed_if_it_touched_or_tilted_at_any_time(when, values):
+    recorder = JumpRecorder(LIMITS, 0.3)
+    at = {phase: values if phase == when else {} for phase in ("launch", "flight", "landing")}
+    time = stand(recorder, 0.0, 0.4, **at["launch"])
+    landing = ballistic(recorder, time, 0.886, **at["flight"])
+    stand(recorder, landing, 0.4, **at["landing"])
+    assert recorder.stood
+    assert not recorder.metrics.landed
+
+
+def test_landed_only_after_the_stand_time():
+    recorder = JumpRecorder(LIMITS, 0.3)
+    landing = ballistic(recorder, stand(recorder, 0.0, 0.4), 0.886)
+    time = stand(recorder, landing, 0.29)
+    assert not recorder.metrics.landed
+    stand(recorder, time, 0.02)
+    assert recorder.metrics.landed
+
+
+@pytest.mark.parametrize(
+    ("values", "violated"),
+    [
+        ({"joint_velocity": np.array([0.0, -5.14])}, False),
+        ({"joint_velocity": np.array([0.0, -5.16])}, True),
+        ({"joint_torque": np.array([37.0, 0.0])}, False),
+        ({"joint_torque": np.array([37.1, 0.0])}, True),
+        ({"joint_position": np.array([1.0, 0.0])}, False),
+        ({"joint_position": np.array([-1.01, 0.0])}, True),
+    ],
+)
+def test_limit_violations(values, violated):
+    recorder = JumpRecorder(LIMITS, 0.3)
+    stand(recorder, 0.0, 0.01, **values)
+    assert recorder.metrics.limit_violations == (10.0 if violated else 0.0)
+
+
+def test_peak_ground_force():
+    recorder = JumpRecorder(LIMITS, 0.3)
+    for i, force in enumerate((300.0, 1700.0, 400.0)):
+        recorder.update(state(i * DT, force=force))
+    assert recorder.metrics.peak_ground_force == 1700.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "success"),
+    [
+        ({}, True),
+        ({"landed": False}, False),
+        ({"flight_time": 0.099}, False),
+        ({"flight_height": 0.0279}, False),
+        ({"flight_height": 0.0281}, True),
+    ],
+)
+def test_success(changes, success):
+    values = {"landed": True, "flight_time": 0.19, "flight_height": 0.04} | changes
+    assert JumpMetrics(**values).is_success(0.04) is success
+
+
+def test_metrics_are_plain_floats_and_bools():
+    for name, value in recorded().metrics.as_dict().items():
+        values = value if name == "angular_momentum_takeoff" else [value]
+        assert all(type(v) in (float, bool) for v in values), name
+
+
+def test_undefined_is_a_nan_that_equals_itself():
+    undefined = JumpMetrics().takeoff_time
+    assert isinstance(undefined, float)
+    assert math.isnan(undefined)
+    assert undefined != undefined
+    assert JumpMetrics() == JumpMetrics()
+    assert pickle.loads(pickle.dumps(undefined)) == undefined
+    assert undefined != 0.0
+    assert json.dumps(undefined) == "NaN"

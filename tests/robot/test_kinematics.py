@@ -1,0 +1,114 @@
+"""Feet-fixed kinematics against the full floating-base model."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from icub_jump_env.robot import facts
+from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
+from icub_jump_env.robot.statics import holding_torque
+
+model = build_pinocchio_model()
+
+
+def floating_base(kinematics, s):
+    """Pinocchio configuration with the base where the feet-fixed kinematics puts it."""
+    quaternion = pin.Quaternion(kinematics.base_rotation).coeffs()
+    return np.concatenate((kinematics.base_position, quaternion, s))
+
+
+def foot_jacobian(q, frame):
+    data = model.createData()
+    return pin.computeFrameJacobian(
+        model, data, q, model.getFrameId(frame), pin.LOCAL_WORLD_ALIGNED
+    )
+
+
+@given(st.integers(0, 10_000))
+def test_maps_equal_the_floating_base_model_with_the_left_foot_at_rest(seed):
+    rng = np.random.default_rng(seed)
+    s = facts.CROUCH + 0.2 * rng.normal(size=facts.N_JOINTS)
+    s_dot = rng.normal(size=facts.N_JOINTS)
+    kinematics = FeetFixedKinematics()
+    kinematics.update(s)
+    q = floating_base(kinematics, s)
+
+    J_left = foot_jacobian(q, "l_sole")
+    base = -np.linalg.solve(J_left[:, :6], J_left[:, 6:] @ s_dot)
+    nu = np.concatenate((base, s_dot))
+    data = model.createData()
+    np.testing.assert_allclose(kinematics.com, pin.centerOfMass(model, data, q), atol=1e-12)
+    momentum = pin.computeCentroidalMomentum(model, data, q, nu)
+    np.testing.assert_allclose(
+        kinematics.J_com @ s_dot, momentum.linear / kinematics.mass, atol=1e-10
+    )
+    np.testing.assert_allclose(kinematics.J_momentum @ s_dot, momentum.angular, atol=1e-10)
+
+
+@given(st.integers(0, 10_000))
+def test_feet_constraint_vanishes_exactly_when_both_feet_are_at_rest(seed):
+    rng = np.random.default_rng(seed)
+    s = facts.CROUCH + 0.1 * rng.normal(size=facts.N_JOINTS)
+    kinematics = FeetFixedKinematics()
+    kinematics.update(s)
+    q = floating_base(kinematics, s)
+    J = np.vstack([foot_jacobian(q, frame) for frame in facts.SOLE_FRAMES])
+    _, _, Vt = np.linalg.svd(J)
+    at_rest = Vt[12:].T @ rng.normal(size=17)
+    assert np.abs(kinematics.J_feet @ at_rest[6:]).max() < 1e-10
+    moving = at_rest + Vt[:12].T @ rng.normal(size=12)
+    left_at_rest = moving[6:]
+    right_velocity = J[6:] @ np.concatenate(
+        (-np.linalg.solve(J[:6, :6], J[:6, 6:] @ left_at_rest), left_at_rest)
+    )
+    assert (np.abs(right_velocity).max() < 1e-6) == (
+        np.abs(kinematics.J_feet @ left_at_rest).max() < 1e-6
+    )
+
+
+def test_com_jacobian_is_the_derivative_of_the_com(rng):
+    kinematics = FeetFixedKinematics()
+    s, step = facts.CROUCH.copy(), 1e-6
+    kinematics.update(s)
+    J = kinematics.J_com.copy()
+    direction = rng.normal(size=facts.N_JOINTS)
+    ends = []
+    for sign in (1, -1):
+        kinematics.update(s + sign * step * direction)
+        ends.append(kinematics.com.copy())
+    np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), J @ direction, atol=1e-7)
+
+
+def test_sole_stays_flat_on_the_floor(rng):
+    kinematics = FeetFixedKinematics()
+    s = facts.CROUCH + 0.2 * rng.normal(size=facts.N_JOINTS)
+    kinematics.update(s)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, floating_base(kinematics, s))
+    left = data.oMf[model.getFrameId("l_sole")]
+    np.testing.assert_allclose(left.rotation, np.eye(3), atol=1e-12)
+    assert left.translation[2] + facts.SOLE.bottom == pytest.approx(0.0, abs=1e-12)
+    assert left.translation[1] > 0
+
+
+def test_robot_faces_forward():
+    kinematics = FeetFixedKinematics()
+    kinematics.update(np.zeros(facts.N_JOINTS))
+    np.testing.assert_allclose(kinematics.base_rotation @ [-1, 0, 0], [1, 0, 0], atol=1e-12)
+
+
+def test_holding_torque_balances_gravity():
+    kinematics = FeetFixedKinematics()
+    kinematics.update(facts.CROUCH)
+    q = floating_base(kinematics, facts.CROUCH)
+    torque = holding_torque(q)
+    gravity = pin.computeGeneralizedGravity(model, model.createData(), q)
+    J = np.vstack([foot_jacobian(q, frame) for frame in facts.SOLE_FRAMES])
+    residual = gravity - np.concatenate((np.zeros(6), torque))
+    wrenches, *_ = np.linalg.lstsq(J.T, residual, rcond=None)
+    np.testing.assert_allclose(J.T @ wrenches, residual, atol=1e-9)
+    vertical = wrenches[2] + wrenches[8]
+    assert vertical == pytest.approx(kinematics.mass * 9.81, rel=1e-9)
+    assert (np.abs(torque) < facts.EFFORT_LIMIT).all()

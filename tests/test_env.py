@@ -1,0 +1,499 @@
+"""The environment as its users meet it."""
+
+import copy
+import gc
+import math
+import pickle
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import psutil
+import pytest
+from gymnasium.utils.env_checker import check_env
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import icub_jump_env
+from icub_jump_env import observation
+from icub_jump_env.errors import ActionError, ConfigError, ICubJumpError
+
+ZERO = np.zeros(3, dtype=np.float32)
+
+
+@pytest.fixture
+def env():
+    env = gymnasium.make("ICubJump-v0", stand_time=0.3)
+    yield env
+    env.close()
+
+
+def rollout(env, actions=None, seed=0, options=None):
+    """All observations, rewards and the last info of an episode."""
+    rng = np.random.default_rng(seed)
+    obs, _ = env.reset(seed=seed, options=options)
+    observations, rewards, terminated = [obs], [], False
+    while not terminated:
+        action = ZERO if actions is None else actions(rng)
+        obs, reward, terminated, truncated, info = env.step(action)
+        assert not truncated
+        observations.append(obs)
+        rewards.append(reward)
+    return np.array(observations), np.array(rewards), info
+
+
+def random_action(rng):
+    return rng.uniform(-1, 1, 3).astype(np.float32)
+
+
+@pytest.mark.parametrize("name", ["ICubJump-v0", "icub_jump_env:ICubJump-v0"])
+def test_both_names_make_it(name):
+    env = gymnasium.make(name)
+    assert env.unwrapped.config == icub_jump_env.JumpConfig()
+    env.close()
+
+
+def test_gymnasium_checker_passes_without_warnings():
+    env = gymnasium.make("ICubJump-v0", stand_time=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+
+
+def test_stable_baselines3_checker_passes_without_warnings():
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    env = gymnasium.make("ICubJump-v0", stand_time=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(env.unwrapped, warn=True)
+    env.close()
+
+
+def test_spaces_and_timing(env):
+    assert env.action_space == gymnasium.spaces.Box(-1, 1, (3,), np.float32)
+    assert env.observation_space.shape == (observation.SIZE,)
+    assert env.unwrapped.dt == pytest.approx(0.01)
+    assert env.unwrapped.model.opt.timestep == 0.001
+    env.reset(seed=0)
+    env.step(ZERO)
+    assert env.unwrapped.data.time == pytest.approx(0.01)
+
+
+def test_starts_at_rest_in_the_crouch(env):
+    env.reset(seed=0)
+    data = env.unwrapped.data
+    assert data.time == 0.0
+    assert not data.qvel.any()
+    assert np.abs(data.qacc).max() < 0.1
+    assert data.sensor("floor_force").data[3] == pytest.approx(324.3, rel=1e-3)
+    for _ in range(10):  # the reference hardly moves in the first 0.1 s
+        env.step(ZERO)
+    assert np.abs(data.qvel[:3]).max() < 0.05
+
+
+def test_world_frame(env):
+    env.reset(seed=0)
+    data = env.unwrapped.data
+    left, right = data.body("l_sole").xpos, data.body("r_sole").xpos
+    assert left[1] > 0.05
+    assert right[1] < -0.05
+    np.testing.assert_allclose((left + right)[:2] / 2, 0.0, atol=1e-3)
+    toes = data.body("l_sole").xmat.reshape(3, 3) @ [1, 0, 0]
+    np.testing.assert_allclose(toes, [1, 0, 0], atol=1e-3)
+
+
+def test_reward_is_the_sum_of_its_terms(env):
+    rng = np.random.default_rng(0)
+    env.reset(seed=0)
+    terminated = False
+    while not terminated:
+        _, reward, terminated, _, info = env.step(random_action(rng))
+        terms = {k: v for k, v in info.items() if k.startswith("reward_")}
+        assert set(terms) == {
+            "reward_landed",
+            "reward_height",
+            "reward_rotation",
+            "reward_residual",
+        }
+        assert reward == sum(terms.values())
+
+
+def test_info_of_every_step(env):
+    env.reset(seed=0)
+    for _ in range(20):
+        *_, info = env.step(ZERO)
+        assert isinstance(info["is_success"], bool)
+        assert info["outcome"] == "running"
+        assert set(info["jump"]) == {
+            "takeoff_time", "takeoff_velocity", "ballistic_height", "flight_time",
+            "flight_height", "apex_height", "sole_height", "flight_rotation",
+            "base_pitch_range", "angular_momentum_takeoff", "peak_ground_force", "landed",
+            "solver_failures", "limit_violations",
+        }  # fmt: skip
+
+
+def test_observations_are_finite_and_inside_the_space(env):
+    for seed in range(3):
+        observations, _, _ = rollout(env, random_action, seed)
+        assert np.isfinite(observations).all()
+        assert all(env.observation_space.contains(obs) for obs in observations)
+
+
+def test_observations_are_sensibly_scaled(env):
+    observations, _, _ = rollout(env)
+    assert (np.abs(observations).max(axis=0) <= observation.OBSERVATION_LIMIT).all()
+    moving = observations.std(axis=0) > 1e-6
+    assert moving.sum() > 50
+    assert np.median(np.abs(observations[:, moving]).max(axis=0)) > 0.02
+    clipped = (np.abs(observations) == observation.OBSERVATION_LIMIT).mean(axis=0)
+    assert clipped.max() < 0.05
+
+
+def test_observation_layout():
+    covered = np.zeros(observation.SIZE, dtype=int)
+    for block in observation.BLOCKS:
+        covered[observation.SLICES[block.name]] += 1
+    assert (covered == 1).all()
+    assert observation.layout_table().count("\n") == observation.SIZE + 1
+
+
+def test_observation_values(env):
+    obs, _ = env.reset(seed=0, options={"jump_height": 0.05})
+    slices = observation.SLICES
+    np.testing.assert_array_equal(obs[slices["phase"]], [1, 0, 0])
+    assert obs[slices["jump_height"]] == pytest.approx(1.0)
+    assert obs[slices["com_displacement"]] == pytest.approx(1.1)
+    assert np.abs(obs[slices["joint_position"]]).max() < 0.01
+    assert obs[slices["foot_force"]].sum() * 300 == pytest.approx(324.3, rel=1e-2)
+
+
+def test_no_privileged_state_in_the_observation():
+    """Where the robot is in the world is nothing its sensors tell."""
+    observations = []
+    for shift in (0.0, 3.0):
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env._crouch_qpos[:2] += shift
+        obs, _ = env.reset(seed=0)
+        for _ in range(30):
+            obs, *_ = env.step(ZERO)
+        observations.append(obs)
+        assert env.data.qpos[0] == pytest.approx(shift, abs=0.2)
+        env.close()
+    np.testing.assert_allclose(*observations, atol=1e-4)
+
+
+def test_forces_enter_through_ctrl_alone(env):
+    env.reset(seed=0)
+    data, limit = env.unwrapped.data, env.unwrapped.model.actuator_ctrlrange[:, 1]
+    for _ in range(60):
+        env.step(ZERO)
+        assert not data.qfrc_applied.any()
+        assert not data.xfrc_applied.any()
+        assert (np.abs(data.ctrl) <= limit).all()
+        np.testing.assert_array_equal(data.actuator_force, data.ctrl)
+
+
+class TestDeterminism:
+    def test_same_seed_same_bits_also_after_dirty_episodes(self, env):
+        fresh = rollout(env, random_action, seed=3)
+        rollout(env, random_action, seed=4)
+        env.reset(seed=5)
+        for _ in range(47):
+            env.step(np.ones(3, np.float32))
+        again = rollout(env, random_action, seed=3)
+        np.testing.assert_array_equal(again[0], fresh[0])
+        np.testing.assert_array_equal(again[1], fresh[1])
+        assert again[2] == fresh[2]
+
+    @pytest.mark.parametrize("solver", ["daqp", "osqp"])
+    def test_same_bits_in_another_process(self, solver):
+        program = (
+            "import gymnasium, icub_jump_env, numpy as np, hashlib\n"
+            f"env = gymnasium.make('ICubJump-v0', stand_time=0.1, solver={solver!r})\n"
+            "env.reset(seed=0); h = hashlib.sha256(); done = False\n"
+            "while not done:\n"
+            "    obs, r, done, _, info = env.step(np.full(3, 0.1, np.float32))\n"
+            "    h.update(obs.tobytes()); h.update(env.unwrapped.data.qpos.tobytes())\n"
+            "print(h.hexdigest())\n"
+        )
+        digests = {
+            subprocess.run(
+                [sys.executable, "-c", program], check=True, capture_output=True, text=True
+            ).stdout
+            for _ in range(2)
+        }
+        assert len(digests) == 1
+
+    def test_interleaved_environments_do_not_disturb_each_other(self):
+        alone = rollout(gymnasium.make("ICubJump-v0", stand_time=0.1), random_action, 1)
+        envs = [gymnasium.make("ICubJump-v0", stand_time=0.1, jump_height=h) for h in (0.04, 0.06)]
+        rngs = [np.random.default_rng(1), np.random.default_rng(2)]
+        observations = [envs[0].reset(seed=1)[0]]
+        envs[1].reset(seed=2)
+        done = [False, False]
+        while not done[0]:
+            for i in range(2):
+                if not done[i]:
+                    obs, _, done[i], _, _ = envs[i].step(random_action(rngs[i]))
+                    if i == 0:
+                        observations.append(obs)
+        np.testing.assert_array_equal(np.array(observations), alone[0])
+
+    def test_stepping_at_the_control_rate_changes_nothing(self):
+        """An agent at 200 Hz with zero actions sees the trajectory of one at 100 Hz."""
+        states = []
+        for frequency in (100.0, 200.0):
+            env = gymnasium.make("ICubJump-v0", agent_frequency=frequency).unwrapped
+            env.reset(seed=0)
+            for _ in range(round(0.6 * frequency)):
+                env.step(ZERO)
+            states.append(np.concatenate((env.data.qpos, env.data.qvel)))
+            env.close()
+        np.testing.assert_array_equal(*states)
+
+    def test_zero_residual_is_the_baseline(self, env):
+        """Whatever the residual scale: the zero action leaves the reference untouched."""
+        wide = gymnasium.make("ICubJump-v0", stand_time=0.3, residual_scale=(0.1, 0.1, 0.1))
+        none = gymnasium.make("ICubJump-v0", stand_time=0.3, residual_scale=(0.0, 0.0, 0.0))
+        states = []
+        for candidate, action in ((wide, ZERO), (none, np.ones(3, np.float32)), (env, -ZERO)):
+            candidate.reset(seed=0)
+            for _ in range(70):
+                candidate.step(action)
+            states.append(candidate.unwrapped.data.qpos.copy())
+        np.testing.assert_array_equal(states[0], states[1])
+        np.testing.assert_array_equal(states[0], states[2])
+
+
+def test_residual_moves_the_com_forward():
+    shifts = []
+    for forward in (0.0, 0.4):
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env.reset(seed=0)
+        for _ in range(35):
+            env.step(np.array([forward, 0, 0], np.float32))
+        shifts.append(env.snapshot().com[0])
+        env.close()
+    assert 0.02 < shifts[1] - shifts[0] < 0.04  # asked for: 0.4 x 6 cm
+
+
+@pytest.mark.parametrize("copier", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize("steps", [0, 20, 50, 70])
+def test_a_copy_continues_bit_for_bit(copier, steps):
+    env = gymnasium.make("ICubJump-v0", stand_time=0.2)
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(steps):
+        env.step(random_action(rng))
+    twin = copier(env)
+    assert twin.unwrapped.data is not env.unwrapped.data
+    terminated = False
+    while not terminated:
+        action = random_action(rng)
+        results = [e.step(action) for e in (env, twin)]
+        np.testing.assert_array_equal(results[0][0], results[1][0])
+        assert results[0][1] == results[1][1]
+        terminated = results[0][2]
+    assert str(results[0][4]) == str(results[1][4])
+    np.testing.assert_array_equal(env.unwrapped.data.qpos, twin.unwrapped.data.qpos)
+
+
+def test_many_environments_leak_nothing():
+    def churn(count):
+        for _ in range(count):
+            env = gymnasium.make("ICubJump-v0")
+            env.reset(seed=0)
+            env.step(ZERO)
+            env.close()
+        gc.collect()
+        return psutil.Process().memory_info().rss
+
+    start = churn(30)
+    assert churn(150) - start < 20e6
+
+
+def test_vector_environments():
+    envs = gymnasium.make_vec("ICubJump-v0", num_envs=2, vectorization_mode="sync", stand_time=0.1)
+    envs.reset(seed=0)
+    for _ in range(75):
+        obs, *_ = envs.step(np.zeros((2, 3), np.float32))
+    np.testing.assert_array_equal(obs[0], obs[1])
+    envs.close()
+
+
+class TestEpisodeEnd:
+    def test_stands_for_the_stand_time(self, env):
+        *_, info = rollout(env)
+        assert info["outcome"] == "stood"
+        jump = info["jump"]
+        stood = info["time"] - jump["takeoff_time"] - jump["flight_time"]
+        assert stood == pytest.approx(0.3, abs=0.011)
+        assert info["is_success"]
+
+    def test_fall_ends_it(self):
+        *_, info = rollout(gymnasium.make("ICubJump-v0", momentum_control=False))
+        assert info["outcome"] == "fell"
+        assert not info["is_success"]
+        assert not info["jump"]["landed"]
+
+    def test_no_take_off_ends_it(self):
+        """Motors that can just hold the crouch never leave the ground."""
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env._servo._effort = np.abs(env._crouch_torque) + 1.0
+        *_, info = rollout(env)
+        assert info["outcome"] == "no take-off"
+        assert info["time"] == pytest.approx(0.43 + 0.5, abs=0.011)
+        assert math.isnan(info["jump"]["takeoff_time"])
+        assert info["jump"]["flight_height"] == 0.0
+
+    def test_reward_of_a_success(self, env):
+        _, rewards, info = rollout(env)
+        assert rewards.sum() == pytest.approx(
+            1.0 + min(1.0, info["jump"]["flight_height"] / 0.04)
+            - abs(info["jump"]["flight_rotation"])
+        )  # fmt: skip
+
+    def test_stepping_on_after_the_end_changes_nothing(self, env):
+        *_, info = rollout(env.unwrapped)
+        _, _, terminated, _, again = env.unwrapped.step(ZERO)
+        assert terminated
+        assert again["jump"] == info["jump"]
+
+    def test_option_overrides_one_episode(self, env):
+        _, info = env.reset(seed=0, options={"jump_height": 0.02})
+        assert info["jump_height"] == 0.02
+        _, info = env.reset(seed=0)
+        assert info["jump_height"] == 0.04
+
+
+class TestDivergence:
+    @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e11, 1e300])
+    @pytest.mark.parametrize("field", ["qpos", "qvel"])
+    def test_ends_the_episode_with_finite_observations(self, env, field, poison):
+        env.reset(seed=0)
+        for _ in range(5):
+            env.step(ZERO)
+        getattr(env.unwrapped.data, field)[12] = poison
+        obs, reward, terminated, truncated, info = env.step(ZERO)
+        assert terminated
+        assert not truncated
+        assert info["diverged"]
+        assert info["outcome"] == "diverged"
+        assert np.isfinite(obs).all()
+        assert math.isfinite(reward)
+        assert not info["is_success"]
+
+    def test_time_running_back_is_divergence(self, env):
+        """A reset behind our back leaves only finite numbers and no warning."""
+        import mujoco
+
+        env.reset(seed=0)
+        for _ in range(5):
+            env.step(ZERO)
+        mujoco.mj_resetData(env.unwrapped.model, env.unwrapped.data)
+        *_, terminated, _, info = env.step(ZERO)
+        assert terminated
+        assert info["diverged"]
+
+    def test_step_before_reset_is_refused(self):
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            env.step(ZERO)
+
+    def test_the_next_episode_is_clean(self, env):
+        clean = rollout(env)
+        env.reset(seed=0)
+        env.unwrapped.data.qvel[4] = np.nan
+        env.step(ZERO)
+        again = rollout(env)
+        np.testing.assert_array_equal(again[0], clean[0])
+
+
+class TestBadInput:
+    @pytest.mark.parametrize(
+        ("field", "value"),
+        [
+            ("controller", "psychic"), ("jump_height", -0.01), ("jump_height", 0.0),
+            ("jump_height", 1.0), ("jump_height", math.nan), ("jump_height", "high"),
+            ("jump_height", None), ("jump_height", True), ("com_displacement", 0.5),
+            ("com_displacement", -0.1), ("com_displacement", math.inf), ("com_scaling", "time"),
+            ("momentum_control", "yes"), ("momentum_control", 1), ("solver", "magic"),
+            ("solver", ["daqp"]), ("residual_scale", 0.1), ("residual_scale", (0.1, 0.1)),
+            ("residual_scale", (0.1, 0.1, -0.1)), ("residual_scale", (0.1, 0.1, math.nan)),
+            ("residual_scale", "abc"), ("timestep", 0.0), ("timestep", 0.1),
+            ("timestep", math.nan), ("control_frequency", 150.0), ("control_frequency", 0.0),
+            ("control_frequency", 3000.0), ("agent_frequency", 300.0), ("stand_time", -1.0),
+            ("stand_time", math.inf), ("ankle_shift", 15), ("render_mode", "ansi"),
+            ("wings", 2),
+        ],
+    )  # fmt: skip
+    @pytest.mark.filterwarnings("ignore:.*not in the possible render_modes")
+    def test_make_refuses_and_names_field_value_and_range(self, field, value):
+        with pytest.raises(ConfigError) as refusal:
+            gymnasium.make("ICubJump-v0", **{field: value})
+        assert refusal.value.field.startswith(field)
+        assert repr(value) in str(refusal.value)
+        assert refusal.value.allowed
+        assert isinstance(refusal.value, ICubJumpError)
+        assert isinstance(refusal.value, ValueError)
+
+    def test_numpy_values_are_welcome(self):
+        env = gymnasium.make(
+            "ICubJump-v0", jump_height=np.float32(0.05), residual_scale=np.full(3, 0.02)
+        )
+        assert env.unwrapped.config.jump_height == pytest.approx(0.05)
+        env.close()
+
+    @pytest.mark.parametrize(
+        "options",
+        [
+            {"jump_height": -1.0},
+            {"jump_height": math.nan},
+            {"height": 0.04},
+            {"timestep": 0.001},
+            3,
+        ],
+    )
+    def test_reset_refuses_and_stays_usable(self, env, options):
+        with pytest.raises(ConfigError):
+            env.unwrapped.reset(options=options)
+        env.reset(seed=0)
+        env.step(ZERO)
+
+    @pytest.mark.parametrize(
+        "action",
+        [
+            np.full(3, np.nan), np.full(3, np.inf), np.full(3, 1.01), np.zeros(2),
+            np.zeros((3, 1)), 0.0, None, "jump", [1, 2], ["a", "b", "c"], [[0, 0], [0]],
+        ],
+    )  # fmt: skip
+    def test_step_refuses_and_changes_nothing(self, env, action):
+        env.reset(seed=0)
+        env.step(ZERO)
+        before = env.unwrapped.data.qpos.copy()
+        with pytest.raises(ActionError) as refusal:
+            env.step(action)
+        assert refusal.value.field == "action"
+        np.testing.assert_array_equal(env.unwrapped.data.qpos, before)
+
+    def test_errors_survive_pickling(self):
+        for kind in (ActionError, ConfigError):
+            error = pickle.loads(pickle.dumps(kind("field", 3, "less")))
+            assert (error.field, error.value, error.allowed) == ("field", 3, "less")
+            assert str(error) == "field=3 is not allowed: less"
+
+
+@settings(max_examples=10)
+@given(st.integers(0, 2**31 - 1))
+def test_any_actions_keep_the_promises(seed):
+    """Whatever the agent does: finite observations, limits, no solver surprises."""
+    env = gymnasium.make("ICubJump-v0", stand_time=0.1, residual_scale=(0.1, 0.1, 0.1))
+    observations, rewards, info = rollout(env, random_action, seed)
+    env.close()
+    assert np.isfinite(observations).all()
+    assert np.isfinite(rewards).all()
+    assert info["outcome"] in ("stood", "fell", "no take-off")
+    assert len(rewards) < 400
