@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Literal, Self, get_args
 
+from icub_jump_env.checks import (
+    check_choice,
+    check_flag,
+    check_number,
+    check_triple,
+    is_multiple,
+)
 from icub_jump_env.control.solvers import SolverName
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.reference.com_trajectory import (
@@ -70,21 +75,26 @@ class JumpConfig:
     render_mode: RenderMode | None = None
 
     def __post_init__(self) -> None:
-        _choice("controller", self.controller, get_args(ControllerName))
-        _choice("com_scaling", self.com_scaling, get_args(ComScaling))
-        _choice("solver", self.solver, get_args(SolverName))
-        _choice("render_mode", self.render_mode, (None, *get_args(RenderMode)))
-        _flag("momentum_control", self.momentum_control)
-        _flag("ankle_shift", self.ankle_shift)
-        self._store("jump_height", _number("jump_height", self.jump_height, *JUMP_HEIGHT_RANGE))
+        check_choice("controller", self.controller, get_args(ControllerName))
+        check_choice("com_scaling", self.com_scaling, get_args(ComScaling))
+        check_choice("solver", self.solver, get_args(SolverName))
+        check_choice("render_mode", self.render_mode, (None, *get_args(RenderMode)))
+        check_flag("momentum_control", self.momentum_control)
+        check_flag("ankle_shift", self.ankle_shift)
+        self._store(
+            "jump_height", check_number("jump_height", self.jump_height, *JUMP_HEIGHT_RANGE)
+        )
         if self.com_displacement is not None:
             self._store(
                 "com_displacement",
-                _number("com_displacement", self.com_displacement, *DISPLACEMENT_RANGE),
+                check_number("com_displacement", self.com_displacement, *DISPLACEMENT_RANGE),
             )
-        self._store("residual_scale", _residual_scale(self.residual_scale))
-        self._store("timestep", _number("timestep", self.timestep, *TIMESTEP_RANGE))
-        self._store("stand_time", _number("stand_time", self.stand_time, *STAND_TIME_RANGE))
+        self._store(
+            "residual_scale",
+            check_triple("residual_scale", self.residual_scale, *RESIDUAL_RANGE),
+        )
+        self._store("timestep", check_number("timestep", self.timestep, *TIMESTEP_RANGE))
+        self._store("stand_time", check_number("stand_time", self.stand_time, *STAND_TIME_RANGE))
         self._check_rates()
         plan_com_trajectory(self.jump_height, self.com_displacement, self.com_scaling)
 
@@ -97,8 +107,8 @@ class JumpConfig:
             ("control_frequency", (1.0, rate)),
             ("agent_frequency", AGENT_FREQUENCY_RANGE),
         ):
-            frequency = _number(field, getattr(self, field), *limits)
-            if not _is_multiple(rate, frequency):
+            frequency = check_number(field, getattr(self, field), *limits)
+            if not is_multiple(rate, frequency):
                 raise ConfigError(field, frequency, f"a divisor of {rate:g} Hz, the rate below it")
             self._store(field, frequency)
             rate = frequency
@@ -145,35 +155,3 @@ class JumpConfig:
             if name != "jump_height":
                 raise ConfigError(f"options[{name!r}]", value, "the only option is 'jump_height'")
         return dataclasses.replace(self, **options)
-
-
-def _choice(field: str, value: Any, allowed: tuple[Any, ...]) -> None:
-    if not any(type(value) is type(choice) and value == choice for choice in allowed):
-        raise ConfigError(field, value, f"one of {', '.join(map(repr, allowed))}")
-
-
-def _flag(field: str, value: Any) -> None:
-    if not isinstance(value, bool):
-        raise ConfigError(field, value, "True or False")
-
-
-def _number(field: str, value: Any, low: float, high: float) -> float:
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    if not number or not low <= float(value) <= high:
-        raise ConfigError(field, value, f"a number from {low:g} to {high:g}")
-    return float(value)
-
-
-def _residual_scale(value: Any) -> tuple[float, float, float]:
-    low, high = RESIDUAL_RANGE
-    try:
-        x, y, z = (_number("residual_scale", item, low, high) for item in value)
-    except (TypeError, ValueError):
-        allowed = f"three numbers from {low:g} to {high:g} m: forward, lateral, vertical"
-        raise ConfigError("residual_scale", value, allowed) from None
-    return x, y, z
-
-
-def _is_multiple(value: float, unit: float) -> bool:
-    ratio = value / unit
-    return math.isclose(ratio, round(ratio), rel_tol=1e-9) and round(ratio) >= 1

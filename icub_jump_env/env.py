@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from icub_jump_env import observation
+from icub_jump_env.checks import check_action, check_seed
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.command import QPReport
 from icub_jump_env.control.jump import JumpController
 from icub_jump_env.control.phases import Phase
 from icub_jump_env.control.velocity import VelocityController
-from icub_jump_env.errors import ActionError
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.metrics.jump import JointLimits, JumpRecorder
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
@@ -81,8 +81,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Info
     Every step: ``jump`` (dict of :class:`icub_jump_env.metrics.jump.JumpMetrics`, final
     at the end), ``is_success``, ``outcome``, ``phase``, ``time``, ``diverged``,
-    ``solver_status``, ``solver_residuals`` and the reward terms. ``reset`` returns the
-    command.
+    ``jump_height``, ``solver_status``, ``solver_primal_residual``,
+    ``solver_dual_residual``, ``solver_gap`` and, from ``step``, the reward terms.
 
     ## Arguments
     The fields of :class:`icub_jump_env.config.JumpConfig`. ``reset(options=
@@ -174,10 +174,10 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             Observation and info.
 
         Raises:
-            ConfigError: If an option is unknown or out of range.
+            ConfigError: If the seed or an option is unknown or out of range.
         """
         episode = self.config.with_options(options)
-        super().reset(seed=seed)
+        super().reset(seed=check_seed(seed))
         self._episode = episode
         self._settle()
         self._sensors.read()
@@ -212,8 +212,9 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         if self._outcome == "not reset":
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        action64 = _check_action(action)
+        action64 = check_action(action)
         target = action64 * self._residual_scale
+        already_over = self._outcome != "running"
         for _ in range(self.config.controls_per_step):
             if self._outcome == "running":
                 self._control_tick(target)
@@ -221,7 +222,10 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._outcome != "diverged":
             self._observe()
         terms = reward_terms(
-            self._recorder.metrics, self._episode.jump_height, action64, terminated
+            self._recorder.metrics,
+            self._episode.jump_height,
+            action64,
+            ends=terminated and not already_over,
         )
         if self.render_mode == "human":
             self.render()
@@ -376,14 +380,3 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "solver_dual_residual": residuals.dual if residuals else 0.0,
             "solver_gap": residuals.gap if residuals else 0.0,
         }
-
-
-def _check_action(action: Any) -> NDArray[np.float64]:
-    allowed = "three finite numbers in [-1, 1]"
-    try:
-        array = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ActionError("action", action, allowed) from None
-    if array.shape != (3,) or not (np.abs(array) <= 1.0).all():
-        raise ActionError("action", action, allowed)
-    return array

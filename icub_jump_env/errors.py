@@ -18,13 +18,16 @@ class InvalidValueError(ICubJumpError, ValueError):
         allowed: What would have been accepted, in words.
     """
 
-    def __init__(self, field: str, value: Any, allowed: str) -> None:
-        super().__init__(f"{field}={value!r} is not allowed: {allowed}")
+    def __init__(self, field: str, value: Any = None, allowed: str | None = None) -> None:
+        # Gymnasium's asynchronous vector environment re-raises with the message alone.
+        super().__init__(
+            field if allowed is None else f"{field}={value!r} is not allowed: {allowed}"
+        )
         self.field = field
         self.value = value
         self.allowed = allowed
 
-    def __reduce__(self) -> tuple[type[InvalidValueError], tuple[str, Any, str]]:
+    def __reduce__(self) -> tuple[type[InvalidValueError], tuple[str, Any, str | None]]:
         return type(self), (self.field, self.value, self.allowed)
 
 

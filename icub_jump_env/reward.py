@@ -21,7 +21,7 @@ def reward_terms(
     metrics: JumpMetrics,
     jump_height: float,
     action: NDArray[np.float64],
-    terminated: bool,
+    ends: bool,
 ) -> dict[str, float]:
     """The named reward terms.
 
@@ -34,13 +34,13 @@ def reward_terms(
         metrics: Metrics so far.
         jump_height: Commanded height (m).
         action: (3,) action in [-1, 1].
-        terminated: Whether the episode ended with this step.
+        ends: Whether the episode ended with this step.
 
     Returns:
         Term by name.
     """
     landed = height = rotation = 0.0
-    if terminated:
+    if ends:
         landed = LANDED_REWARD * metrics.landed
         height = HEIGHT_REWARD * min(1.0, metrics.flight_height / jump_height)
         if not math.isnan(metrics.flight_rotation):

@@ -356,11 +356,29 @@ class TestEpisodeEnd:
             - abs(info["jump"]["flight_rotation"])
         )  # fmt: skip
 
-    def test_stepping_on_after_the_end_changes_nothing(self, env):
+    def test_stepping_on_after_the_end_changes_and_pays_nothing(self, env):
         *_, info = rollout(env.unwrapped)
-        _, _, terminated, _, again = env.unwrapped.step(ZERO)
+        _, reward, terminated, _, again = env.unwrapped.step(ZERO)
         assert terminated
+        assert reward == 0.0
         assert again["jump"] == info["jump"]
+
+    @pytest.mark.parametrize("timestep", [1e-3, 1e-4])
+    def test_without_stand_time_the_jump_still_happens(self, timestep):
+        *_, info = rollout(gymnasium.make("ICubJump-v0", stand_time=0.0, timestep=timestep))
+        assert info["outcome"] == "stood"
+        assert info["jump"]["flight_height"] > 0.035
+
+    def test_a_residual_that_leans_in_the_launch_can_still_land(self):
+        env = gymnasium.make("ICubJump-v0", stand_time=0.5).unwrapped
+        env.reset(seed=0)
+        terminated, tilt = False, 0.0
+        while not terminated:
+            action = [0.3, 0, -1] if env.data.time < 0.1 else ZERO
+            _, _, terminated, _, info = env.step(action)
+            tilt = max(tilt, env._truth.state.chest_tilt)
+        assert math.degrees(tilt) > 30.0
+        assert info["is_success"]
 
     def test_option_overrides_one_episode(self, env):
         _, info = env.reset(seed=0, options={"jump_height": 0.02})
@@ -370,7 +388,7 @@ class TestEpisodeEnd:
 
 
 class TestDivergence:
-    @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e11, 1e300])
+    @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e6, 1e11, 1e300])
     @pytest.mark.parametrize("field", ["qpos", "qvel"])
     def test_ends_the_episode_with_finite_observations(self, env, field, poison):
         env.reset(seed=0)
@@ -427,7 +445,7 @@ class TestBadInput:
             ("timestep", math.nan), ("control_frequency", 150.0), ("control_frequency", 0.0),
             ("control_frequency", 3000.0), ("agent_frequency", 300.0), ("stand_time", -1.0),
             ("stand_time", math.inf), ("ankle_shift", 15), ("render_mode", "ansi"),
-            ("wings", 2),
+            ("wings", 2), ("jump_height", 10**400), ("residual_scale", {0.01, 0.02, 0.03}),
         ],
     )  # fmt: skip
     @pytest.mark.filterwarnings("ignore:.*not in the possible render_modes")
@@ -442,8 +460,13 @@ class TestBadInput:
 
     def test_numpy_values_are_welcome(self):
         env = gymnasium.make(
-            "ICubJump-v0", jump_height=np.float32(0.05), residual_scale=np.full(3, 0.02)
+            "ICubJump-v0",
+            jump_height=np.float32(0.05),
+            residual_scale=np.full(3, 0.02),
+            momentum_control=np.True_,
+            solver=np.str_("daqp"),
         )
+        env.reset(seed=np.int64(3))
         assert env.unwrapped.config.jump_height == pytest.approx(0.05)
         env.close()
 
@@ -463,11 +486,23 @@ class TestBadInput:
         env.reset(seed=0)
         env.step(ZERO)
 
+    @pytest.mark.parametrize("seed", [-1, "a", 1.5, True])
+    def test_reset_refuses_bad_seeds(self, env, seed):
+        with pytest.raises(ConfigError, match="seed"):
+            env.unwrapped.reset(seed=seed)
+
+    def test_errors_can_be_raised_again_from_their_message(self):
+        """As Gymnasium's asynchronous vector environment does it."""
+        error = ActionError(str(ActionError("action", None, "three numbers")))
+        assert str(error) == "action=None is not allowed: three numbers"
+        assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
     @pytest.mark.parametrize(
         "action",
         [
             np.full(3, np.nan), np.full(3, np.inf), np.full(3, 1.01), np.zeros(2),
-            np.zeros((3, 1)), 0.0, None, "jump", [1, 2], ["a", "b", "c"], [[0, 0], [0]],
+            np.zeros((3, 1)), ["0", "0", "0"], np.zeros(3, complex), np.zeros(3, bool), 0.0,
+            [0, 0, 10**400], None, "jump", [1, 2], ["a", "b", "c"], [[0, 0], [0]],
         ],
     )  # fmt: skip
     def test_step_refuses_and_changes_nothing(self, env, action):

@@ -46,6 +46,8 @@ class VelocityGains:
         smoothness_weight: Diagonal of Delta, per joint.
         com_weight: Weight of the CoM task's residual ((m/s)^-2).
         momentum_weight: Weight of the momentum residual ((kg m^2/s)^-2).
+        limit_horizon: Position limits must hold if the velocity is kept for this long (s).
+            The paper takes one control period, in which no joint can stop.
         velocity_margin: Share of the speed limits that the QP may use; the rest is for
             the servos' overshoot.
     """
@@ -57,6 +59,7 @@ class VelocityGains:
     smoothness_weight: tuple[float, ...] = _per_joint(leg=0.1, torso=0.1, arm=0.01)
     com_weight: float = 1e5
     momentum_weight: float = 1e3
+    limit_horizon: float = 0.02
     velocity_margin: float = 0.98
 
 
@@ -102,7 +105,8 @@ class VelocityController:
         self._posture_pull = self._posture_weight * posture
         self._speed = facts.VELOCITY_LIMIT * gains.velocity_margin
         self._slowest = -self._speed
-        self._lower_rate, self._upper_rate = (limit / dt for limit in position_limits)
+        self._horizon = max(gains.limit_horizon, dt)
+        self._lower_rate, self._upper_rate = (limit / self._horizon for limit in position_limits)
         # Rows of the CoM task (3b), then of the momentum constraint (3d).
         self._rows = 6 if momentum_control else 3
         weights = np.repeat((gains.com_weight, gains.momentum_weight), 3)
@@ -180,7 +184,7 @@ class VelocityController:
 
         problem.C[:] = kinematics.J_feet  # (3c)
 
-        n, rate = problem.n, s / self._dt
+        n, rate = problem.n, s / self._horizon
         for limit, bound in (
             (self._lower_rate, problem.lower[:n]),
             (self._upper_rate, problem.upper[:n]),

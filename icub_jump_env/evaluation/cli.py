@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, ICubJumpError
+from icub_jump_env.simulation.opengl import import_mujoco
 
 T = TypeVar("T")
 
@@ -84,11 +86,13 @@ def evaluate(arguments: Sequence[str]) -> None:
 
 
 def _evaluate(options: EvalOptions) -> None:
+    import_mujoco(offscreen=options.video is not None)
     # Imported here so that --help and bad arguments answer at once.
     from icub_jump_env.evaluation.nominal import nominal_report, run_nominal
     from icub_jump_env.evaluation.output import check_writable, write_json
     from icub_jump_env.evaluation.table import comparison_rows, render_table, verdict
 
+    momentum_control = options.config.momentum_control
     for name, path in (("json", options.json), ("video", options.video)):
         if path is not None:
             check_writable(name, path)
@@ -111,16 +115,16 @@ def _evaluate(options: EvalOptions) -> None:
     title = (
         f"{options.config.jump_height * 100:g} cm jump; the paper's: 4 cm after 11 cm of launch"
     )
-    console.print(render_table(rows, title))
-    console.print(verdict(rows))
+    console.print(render_table(rows, title, momentum_control))
+    console.print(verdict(rows, momentum_control))
     if options.json is not None:
         write_json(options.json, nominal_report(arms, options.seed))
         console.print(f"wrote {options.json}")
     if options.plot is not None:
         from icub_jump_env.evaluation.figures import draw_figures
 
-        traces = [arm.episodes[0].trace for arm in arms]
-        for file in draw_figures(options.plot, options.config, *traces):
+        episodes = {arm.name: arm.episodes[0] for arm in arms}
+        for file in draw_figures(options.plot, options.config, episodes):
             console.print(f"wrote {file}")
     if options.video is not None:
         record_video(options.video, options.config, options.seed, progress)
@@ -135,7 +139,8 @@ def _one_line(complaint: str) -> str:
         if not line:
             break
         message.append(line)
-    return " ".join(message) or "bad arguments"
+    # tyro says so where a dataclass itself refused; the user knows no dataclass.
+    return re.sub(r"^Error parsing \w*Options: ", "", " ".join(message)) or "bad arguments"
 
 
 def _fail(message: str) -> NoReturn:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
 from icub_jump_env.robot import facts
 from icub_jump_env.snapshot import Snapshot
@@ -19,24 +20,24 @@ MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"
 Trace = Sequence[Snapshot]
 
 
-def draw_figures(folder: Path, config: JumpConfig, with_: Trace, without: Trace) -> list[Path]:
+def draw_figures(folder: Path, config: JumpConfig, episodes: Mapping[str, Episode]) -> list[Path]:
     """Write the figures as PNG files.
 
     Args:
         folder: Where to write them; made if missing.
         config: The jump's configuration.
-        with_: Trace with the momentum constraint.
-        without: Trace without it.
+        episodes: Traced episodes ``with`` and ``without`` the momentum constraint.
 
     Returns:
         The files written.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    ours = episodes["with" if config.momentum_control else "without"]
     files = []
     for name, figure in (
         ("fig1_com_reference", com_reference_figure(config)),
-        ("fig2_launch", launch_figure(config, with_)),
-        ("fig6_base_pitch", base_pitch_figure(with_, without)),
+        ("fig2_launch", launch_figure(config, ours.trace)),
+        ("fig6_base_pitch", base_pitch_figure(episodes)),
     ):
         file = folder / f"{name}.png"
         figure.savefig(file)
@@ -100,38 +101,37 @@ def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
     return figure
 
 
-def base_pitch_figure(with_: Trace, without: Trace) -> Figure:
+def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
     """Fig. 6: base pitch with and without the momentum constraint."""
     figure, (axis,) = _figure(1, 1, (6.5, 3.6))
-    for trace, color, label in (
-        (with_, MEASURED, "with the momentum constraint"),
-        (without, DESIRED, "without"),
+    takeoff = min(episode.jump["takeoff_time"] for episode in episodes.values())
+    fallen = [e.trace[-1].time for e in episodes.values() if e.outcome == "fell"]
+    end = max([takeoff + 0.8, *fallen])
+    for name, color, label in (
+        ("with", MEASURED, "with the momentum constraint"),
+        ("without", DESIRED, "without"),
     ):
-        time = np.array([s.time for s in trace])
-        pitch = np.degrees([s.base_pitch for s in trace])
+        shown = [s for s in episodes[name].trace if s.time <= end]
+        time, pitch = [s.time for s in shown], np.degrees([s.base_pitch for s in shown])
         axis.plot(time, pitch, color=color, label=label)
-        if trace[-1].phase == "landing" and trace[-1].time < with_[-1].time:
+        if episodes[name].outcome == "fell":
             axis.plot(time[-1], pitch[-1], "x", color=color)
             axis.annotate(
                 "falls",
                 (time[-1], pitch[-1]),
-                color=color,
-                xytext=(6, -3),
+                (-8, -3),
                 textcoords="offset points",
+                color=color,
+                ha="right",
             )
-    end = max(without[-1].time, _takeoff(with_) + 0.8)
-    axis.set_xlim(0.0, end)
-    shown = [np.degrees(s.base_pitch) for t in (with_, without) for s in t if s.time <= end]
-    axis.set_ylim(min(shown) - 2.0, max(shown) + 2.0)
-    axis.axvline(_takeoff(with_), color=ACCENT, lw=0.8, ls=":")
+    axis.axvline(takeoff, color=ACCENT, lw=0.8, ls=":")
+    axis.annotate(
+        "take-off", (takeoff, axis.get_ylim()[0]), (4, 4), textcoords="offset points", color=ACCENT
+    )
     _label(axis, "base pitch (positive: forward)", "deg")
     axis.legend(frameon=False)
     figure.suptitle("Fig. 6: base pitch")
     return figure
-
-
-def _takeoff(trace: Trace) -> float:
-    return next((s.time for s in trace if s.phase != "launch"), trace[-1].time)
 
 
 def _trajectory(config: JumpConfig) -> ComTrajectory:

@@ -20,30 +20,34 @@ from icub_jump_env.evaluation.table import comparison_rows
 class Arm:
     """Episodes of one configuration."""
 
-    name: str
     config: JumpConfig
     episodes: tuple[Episode, ...]
+
+    @property
+    def name(self) -> str:
+        """Whether the momentum constraint is posed."""
+        return "with" if self.config.momentum_control else "without"
 
 
 def run_nominal(
     config: JumpConfig, episodes: int, seed: int, trace: bool, console: Console
 ) -> tuple[Arm, Arm]:
-    """Jump with and without the momentum constraint.
+    """Jump as configured, and with the momentum constraint switched over.
 
     Args:
-        config: The jump; its ``momentum_control`` is set by the arms.
+        config: The jump.
         episodes: Episodes of each arm, seeded ``seed``, ``seed + 1``, ...
         seed: First seed.
         trace: Whether the episodes carry snapshots.
         console: Where the progress is shown.
 
     Returns:
-        The arm with the constraint and the one without.
+        The arm as configured and the other one.
     """
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("jumping", total=2 * episodes)
         arms = []
-        for name, momentum_control in (("with", True), ("without", False)):
+        for momentum_control in (config.momentum_control, not config.momentum_control):
             arm_config = dataclasses.replace(config, momentum_control=momentum_control)
             env = make_env(traced(arm_config) if trace else arm_config)
             done = []
@@ -51,16 +55,16 @@ def run_nominal(
                 done.append(run_episode(env, seed + index, trace))
                 progress.advance(task)
             env.close()
-            arms.append(Arm(name, arm_config, tuple(done)))
+            arms.append(Arm(arm_config, tuple(done)))
     return arms[0], arms[1]
 
 
 def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
     """Everything eval.py found, for ``--json``."""
-    with_momentum, without = arms
+    ours, other = arms
     return {
         "mode": "nominal",
-        **provenance(with_momentum.config, seed),
+        **provenance(ours.config, seed),
         "arms": {
             arm.name: {
                 "momentum_control": arm.config.momentum_control,
@@ -77,7 +81,6 @@ def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
             for arm in arms
         },
         "comparison": [
-            dataclasses.asdict(row)
-            for row in comparison_rows(with_momentum.episodes, without.episodes)
+            dataclasses.asdict(row) for row in comparison_rows(ours.episodes, other.episodes)
         ],
     }

@@ -38,9 +38,14 @@ def check_writable(field: str, path: Path, folder: bool = False) -> None:
 def write_json(path: Path, content: Any) -> None:
     """Write strict JSON atomically; NaN, which JSON lacks, becomes null.
 
-    An existing file stays as it is unless the new one is complete.
+    An existing file stays as it is unless the new one is complete. Links are followed;
+    a device such as ``/dev/stdout`` is written to.
     """
     text = json.dumps(_without_nan(content), indent=2, allow_nan=False)
+    path = path.resolve()
+    if path.exists() and not path.is_file():
+        path.write_text(text + "\n")
+        return
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     temporary = Path(name)
     try:

@@ -22,9 +22,9 @@ class Row:
         quantity: What it is.
         unit: Unit of the numbers.
         paper: The paper's value, if it gives one.
-        ours: Median over our episodes with the momentum constraint.
+        ours: Median over our episodes as configured.
         difference: Ours minus the paper's.
-        without_momentum: Median over our episodes without the constraint.
+        switched: Median over our episodes with the momentum constraint switched over.
         source: Where the paper's value comes from.
     """
 
@@ -33,7 +33,7 @@ class Row:
     paper: float | None
     ours: float
     difference: float | None
-    without_momentum: float
+    switched: float
     source: str
 
 
@@ -51,14 +51,12 @@ _QUANTITIES: tuple[tuple[str, str, str, float, float | None, str], ...] = (
 )
 
 
-def comparison_rows(
-    with_momentum: Sequence[Episode], without_momentum: Sequence[Episode]
-) -> list[Row]:
+def comparison_rows(ours: Sequence[Episode], switched: Sequence[Episode]) -> list[Row]:
     """The rows of the table.
 
     Args:
-        with_momentum: Episodes with the momentum constraint.
-        without_momentum: Episodes without it.
+        ours: Episodes as configured.
+        switched: Episodes with the momentum constraint switched over.
 
     Returns:
         One row per quantity: medians, and a mean for the share that landed.
@@ -66,21 +64,26 @@ def comparison_rows(
     rows = []
     for quantity, key, unit, scale, paper, source in _QUANTITIES:
         reduce = np.mean if key == "landed" else np.median
-        ours, without = (
+        value, other = (
             scale * float(reduce([float(episode.jump[key]) for episode in episodes]))
-            for episodes in (with_momentum, without_momentum)
+            for episodes in (ours, switched)
         )
         reference = None if paper is None else scale * paper
-        difference = None if reference is None else ours - reference
-        rows.append(Row(quantity, unit, reference, ours, difference, without, source))
+        difference = None if reference is None else value - reference
+        rows.append(Row(quantity, unit, reference, value, difference, other, source))
     return rows
 
 
-def render_table(rows: Sequence[Row], title: str) -> Table:
-    """The table for the terminal."""
+def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Table:
+    """The table for the terminal; ``momentum_control`` is that of our configuration."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
-    for column in ("paper", "ours", "difference", "no eq. 3d"):
+    for column in (
+        "paper",
+        "ours",
+        "difference",
+        "no eq. 3d" if momentum_control else "with eq. 3d",
+    ):
         table.add_column(column, justify="right", no_wrap=True)
     for row in rows:
         table.add_row(
@@ -88,25 +91,25 @@ def render_table(rows: Sequence[Row], title: str) -> Table:
             _number(row.paper),
             _number(row.ours),
             _number(row.difference, signed=True),
-            _number(row.without_momentum),
+            _number(row.switched),
         )
     table.caption = (
         "paper: simulated heights and landing, commanded take-off, ballistic height of the real "
-        "robot; no eq. 3d: ours without the momentum constraint; medians over the episodes"
+        "robot; eq. 3d: the momentum constraint; medians over the episodes"
     )
     table.caption_justify = "left"
     return table
 
 
-def verdict(rows: Sequence[Row]) -> str:
+def verdict(rows: Sequence[Row], momentum_control: bool) -> str:
     """Which arm of the ablation stands, in a sentence."""
     row = next(row for row in rows if row.quantity.startswith("landed"))
     stands = {100.0: "stands", 0.0: "falls"}
-    ours, without = (
+    with_, without = (
         stands.get(share, f"stands in {share:.0f} % of the episodes")
-        for share in (row.ours, row.without_momentum)
+        for share in ((row.ours, row.switched) if momentum_control else (row.switched, row.ours))
     )
-    return f"With the momentum constraint (3d) the robot {ours}; without it, it {without}."
+    return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
 
 
 def _number(value: float | None, signed: bool = False) -> str:

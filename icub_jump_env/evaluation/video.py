@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from pathlib import Path
 
 from rich.console import Console
@@ -13,12 +12,11 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.rollout import make_env, run_episode
-from icub_jump_env.simulation.rendering import check_offscreen
+from icub_jump_env.simulation.opengl import check_offscreen
 
 SLOW_MOTION = 4
 """Playback is this many times slower than real time."""
 
-FRAME_RATE = 25.0
 AFTER_LANDING = 0.6
 """How much of the standing is shown (s)."""
 
@@ -63,7 +61,6 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
         config,
         render_mode="rgb_array",
         stand_time=min(config.stand_time, AFTER_LANDING),
-        agent_frequency=FRAME_RATE * SLOW_MOTION,
     )
     env = make_env(config)
     frames = []
@@ -76,4 +73,4 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
 
         run_episode(env, seed, on_step=shoot)
     env.close()
-    iio.imwrite(file, frames, fps=math.floor(FRAME_RATE))
+    iio.imwrite(file, frames, fps=max(1, round(config.agent_frequency / SLOW_MOTION)))

@@ -22,6 +22,8 @@ SPEED_TOLERANCE = 1.03
 """A joint violates its speed limit above this multiple of it."""
 POSITION_TOLERANCE = 1e-3
 """... and its position limit beyond this (rad): MuJoCo's limits are slightly soft."""
+CHATTER_TIME = 0.02
+"""A shorter loss of ground contact is no flight (s)."""
 MIN_FLIGHT_TIME = 0.1
 MIN_HEIGHT_RATIO = 0.7
 
@@ -72,8 +74,8 @@ class JumpMetrics:
         angular_momentum_takeoff: Angular momentum about the CoM at take-off, world
             axes (kg m^2/s).
         peak_ground_force: Largest vertical ground force of the episode (N).
-        landed: Whether, ``stand_time`` after touch-down, only the feet had touched the
-            ground and the chest had stayed within 30 deg of upright.
+        landed: Whether, ``stand_time`` after touch-down, only the feet have touched the
+            ground and the chest is within 30 deg of upright.
         solver_failures: Control ticks whose QP solution was not applied.
         limit_violations: Physics steps with a joint beyond 1.03 x its speed limit, or
             beyond its torque or position limit.
@@ -126,8 +128,8 @@ class _Flight:
 class JumpRecorder:
     """Watches the true state and keeps the metrics of the jump up to date.
 
-    The flight that counts is the one with the highest apex, so that neither chatter
-    before take-off nor a bounce after landing is taken for it.
+    The flight that counts is the one with the highest apex among those of at least 20 ms,
+    so that neither chatter before take-off nor a bounce after landing is taken for it.
 
     Attributes:
         metrics: The metrics so far.
@@ -156,7 +158,7 @@ class JumpRecorder:
         self._flight: _Flight | None = None
         self._best_apex = -math.inf
         self._last_time: float | None = None
-        self._upright = True
+        self._only_feet = True
 
     @property
     def stood(self) -> bool:
@@ -173,7 +175,7 @@ class JumpRecorder:
         self._last_time = state.time
         if state.ground_force > metrics.peak_ground_force:
             metrics.peak_ground_force = state.ground_force
-        self._upright = self._upright and state.only_feet_touch and state.chest_tilt < LANDED_TILT
+        self._only_feet = self._only_feet and state.only_feet_touch
         if self._violates(state):
             metrics.limit_violations += 1.0
 
@@ -183,7 +185,7 @@ class JumpRecorder:
             self._fly(self._flight, state, dt)
         elif self._flight is not None:
             self._touch_down(self._flight, state.time)
-        metrics.landed = self._upright and self.stood
+        metrics.landed = self._only_feet and self.stood and state.chest_tilt < LANDED_TILT
 
     def _violates(self, state: TrueState) -> bool:
         return bool(
@@ -201,7 +203,7 @@ class JumpRecorder:
         flight.sole = max(flight.sole, state.sole_height)
         flight.pitch_low = min(flight.pitch_low, state.base_pitch)
         flight.pitch_high = max(flight.pitch_high, state.base_pitch)
-        if flight.apex >= self._best_apex:
+        if flight.duration >= CHATTER_TIME and flight.apex >= self._best_apex:
             self._best_apex = flight.apex
             self.touchdown_time = math.nan
             self._publish(flight)
@@ -220,7 +222,7 @@ class JumpRecorder:
         metrics.angular_momentum_takeoff = flight.momentum
 
     def _touch_down(self, flight: _Flight, time: float) -> None:
-        if flight.apex >= self._best_apex:
+        if flight.duration >= CHATTER_TIME and flight.apex >= self._best_apex:
             self.metrics.flight_time = time - flight.time
             self.touchdown_time = time
         self._flight = None

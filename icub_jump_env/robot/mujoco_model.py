@@ -131,6 +131,17 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
         ("angular_momentum", sensor.mjSENS_SUBTREEANGMOM),
     ):
         spec.add_sensor(name=name, type=kind, objtype=body, objname=facts.BASE_LINK)
+    for quantity, kind in (
+        ("position", sensor.mjSENS_JOINTPOS),
+        ("velocity", sensor.mjSENS_JOINTVEL),
+    ):
+        for joint in facts.JOINT_NAMES:
+            spec.add_sensor(
+                name=f"{joint}_{quantity}",
+                type=kind,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                objname=joint,
+            )
     # The base faces its own -x; the IMU frame is turned to face forward.
     half_yaw = facts.BASE_YAW / 2
     spec.body(facts.BASE_LINK).add_site(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -26,13 +27,12 @@ class GroundTruth:
     def __init__(self, physics: Physics) -> None:
         self._physics = physics
         model, data = physics.model, physics.data
-        self._timestep = model.opt.timestep
         self.state = TrueState(
             com=data.sensor("com").data,
             com_velocity=data.sensor("com_velocity").data,
             angular_momentum=data.sensor("angular_momentum").data,
-            joint_position=physics.joint_position,
-            joint_velocity=physics.joint_velocity,
+            joint_position=data.sensordata[_span(model, "position")],
+            joint_velocity=data.sensordata[_span(model, "velocity")],
             joint_torque=data.actuator_force,
         )
         self._floor = data.sensor("floor_force").data
@@ -53,7 +53,7 @@ class GroundTruth:
     def read(self) -> TrueState:
         """Update the state after a physics step."""
         state = self.state
-        state.time = self._physics.data.time - self._timestep
+        state.time = self._physics.evaluated_time
         # MuJoCo reports the force of the first geom, the floor, on the robot.
         state.ground_force = float(self._floor[3])
         n_soles = self._soles_touching[0][0] + self._soles_touching[1][0]
@@ -66,6 +66,12 @@ class GroundTruth:
         xx, yy, zz, xy, xz, yz = self._composite_inertia[:6]
         state.locked_inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         return state
+
+
+def _span(model: Any, quantity: str) -> slice:
+    """Where the sensors of all joints stand in ``sensordata``."""
+    start = model.sensor(f"{facts.JOINT_NAMES[0]}_{quantity}").adr[0]
+    return slice(start, start + facts.N_JOINTS)
 
 
 _CHEST_UP = np.array([0.0, 1.0, 0.0])

@@ -12,8 +12,8 @@ from icub_jump_env.robot.mujoco_model import build_model
 
 Array = NDArray[np.float64]
 
-_HUGE = 1e10
-"""Where MuJoCo, too, stops believing in a position or velocity (mjMAXVAL)."""
+_HUGE = 1e3
+"""No position (m, rad) or velocity (m/s, rad/s) of a jumping robot comes near this."""
 
 
 class Physics:
@@ -27,6 +27,8 @@ class Physics:
         data: The MuJoCo data.
         joint_position: (23,) live view of the joint positions (rad).
         joint_velocity: (23,) live view of the joint velocities (rad/s).
+        evaluated_time: Time (s) for which MuJoCo last evaluated forces, sensors and all
+            that depends on the state: the beginning of the last step.
     """
 
     def __init__(self, timestep: float, ankle_shift: bool = True, visuals: bool = False) -> None:
@@ -41,32 +43,40 @@ class Physics:
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self._warnings = data.warning.number
         self._last_time = data.time
+        self.evaluated_time = data.time
 
     def __getstate__(self) -> dict[str, Any]:
         # The rest are views, which a copy must take anew of its own data.
-        return {"model": self.model, "data": self.data, "last_time": self._last_time}
+        return {
+            "model": self.model,
+            "data": self.data,
+            "last_time": self._last_time,
+            "evaluated_time": self.evaluated_time,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.model, self.data = state["model"], state["data"]
         self._bind()
         self._last_time = state["last_time"]
+        self.evaluated_time = state["evaluated_time"]
 
     def reset(self, qpos: Array) -> None:
         """Put the robot at rest at MuJoCo positions ``qpos``, (30,)."""
         mujoco.mj_resetData(self.model, self.data)
         self._qpos[:] = qpos
         mujoco.mj_forward(self.model, self.data)
-        self._last_time = 0.0
+        self._last_time = self.evaluated_time = 0.0
 
     def start_from_rest(self) -> None:
         """Stop all motion and set the time to zero, as the last part of a reset."""
         self._qvel[:] = 0.0
-        self.data.time = self._last_time = 0.0
+        self.data.time = self._last_time = self.evaluated_time = 0.0
         mujoco.mj_forward(self.model, self.data)
 
     def step(self, torque: Array) -> None:
         """Advance by one physics step under (23,) joint torques (Nm)."""
         self._ctrl[:] = torque
+        self.evaluated_time = self.data.time
         mujoco.mj_step(self.model, self.data)
         time = self.data.time
         # Once gone backwards, the clock stays behind this mark.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from typing import Any, Protocol
 
 import mujoco
@@ -12,14 +10,10 @@ from numpy.typing import NDArray
 
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.robot.mujoco_model import CAMERA
+from icub_jump_env.simulation.opengl import NO_OPENGL, check_offscreen, has_display
 from icub_jump_env.simulation.physics import Physics
 
 HEIGHT, WIDTH = 480, 640
-
-_NO_GL = (
-    "no OpenGL to render with; on a machine without a display install libegl1 and libgl1 "
-    "(Debian names) and set MUJOCO_GL=egl before Python starts"
-)
 
 
 class Renderer(Protocol):
@@ -32,23 +26,6 @@ class Renderer(Protocol):
     def close(self) -> None:
         """Free window and graphics memory."""
         ...
-
-
-def has_display() -> bool:
-    """Whether a window can be opened."""
-    if not sys.platform.startswith("linux"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def check_offscreen() -> None:
-    """Refuse early if MuJoCo would look for a display that is not there.
-
-    Raises:
-        MissingDependencyError: Naming the remedy.
-    """
-    if not has_display() and os.environ.get("MUJOCO_GL", "") in ("", "glfw"):
-        raise MissingDependencyError(_NO_GL)
 
 
 def make_renderer(physics: Physics, mode: str) -> Renderer:
@@ -81,7 +58,7 @@ class PictureRenderer:
         try:
             return mujoco.Renderer(self._physics.model, self._height, self._width)
         except Exception as error:  # each GL backend has exceptions of its own
-            raise MissingDependencyError(f"{_NO_GL} ({error})") from error
+            raise MissingDependencyError(f"{NO_OPENGL} ({error})") from error
 
     def close(self) -> None:
         """Free the graphics context."""

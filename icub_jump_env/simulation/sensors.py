@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 class Sensors:
     """Latest readings, refreshed by :meth:`read`.
 
+    Encoders show the present state; IMU and feet the beginning of the last physics step,
+    when MuJoCo evaluated them.
+
     The IMU frame sits on ``root_link`` and faces forward: x forward, y left, z up.
 
     Attributes:

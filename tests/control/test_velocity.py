@@ -137,8 +137,10 @@ def test_limits_hold_whatever_is_asked(seed, forward, upward, solver):
     subject = controller(solver=solver)
     command = subject.update(estimator, s, estimator.com, np.array([forward, 0.0, upward]))
     assert (np.abs(command) <= VelocityGains().velocity_margin * facts.VELOCITY_LIMIT).all()
-    assert (s + command * DT >= LIMITS[0] - 1e-12).all()
-    assert (s + command * DT <= LIMITS[1] + 1e-12).all()
+    horizon = VelocityGains().limit_horizon
+    assert horizon >= DT
+    assert (s + command * horizon >= LIMITS[0] - 1e-12).all()
+    assert (s + command * horizon <= LIMITS[1] + 1e-12).all()
     if not subject.report.failed:
         tolerance = {"daqp": 1e-8, "osqp": 1e-6}[solver]
         assert np.abs(estimator.kinematics.J_feet @ command).max() <= tolerance
@@ -273,8 +275,9 @@ def test_feet_and_limits_that_contradict_each_other_are_a_counted_failure():
     command = subject.update(estimator, s, estimator.com, np.zeros(3))
     assert subject.report.status is QPStatus.INFEASIBLE
     # The limits still hold: every joint is on its way back into its range.
-    assert (command[facts.LEFT_LEG] >= 0.02 / DT - 1e-9).all()
-    assert (command[facts.RIGHT_LEG] <= -0.02 / DT + 1e-9).all()
+    horizon = VelocityGains().limit_horizon
+    assert (command[facts.LEFT_LEG] >= 0.02 / horizon - 1e-9).all()
+    assert (command[facts.RIGHT_LEG] <= -0.02 / horizon + 1e-9).all()
 
 
 def test_reset_makes_a_controller_as_new():

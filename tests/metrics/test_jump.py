@@ -139,18 +139,38 @@ def test_one_newton_is_airborne():
         assert recorder.metrics.flight_height == pytest.approx(height, abs=1e-4)
 
 
-@pytest.mark.parametrize(
-    "values", [{"only_feet_touch": False}, {"chest_tilt": math.radians(31.0)}]
-)
-@pytest.mark.parametrize("when", ["launch", "flight", "landing"])
-def test_not_landed_if_it_touched_or_tilted_at_any_time(when, values):
+@pytest.mark.parametrize("when", ["launch", "flight", "landing", "never"])
+def test_not_landed_if_anything_else_touched_at_any_time(when):
     recorder = JumpRecorder(LIMITS, 0.3)
-    at = {phase: values if phase == when else {} for phase in ("launch", "flight", "landing")}
+    touch = {"only_feet_touch": False}
+    at = {phase: touch if phase == when else {} for phase in ("launch", "flight", "landing")}
     time = stand(recorder, 0.0, 0.4, **at["launch"])
     landing = ballistic(recorder, time, 0.886, **at["flight"])
-    stand(recorder, landing, 0.4, **at["landing"])
+    time = stand(recorder, landing, 0.2, **at["landing"])
+    stand(recorder, time, 0.2)
     assert recorder.stood
-    assert not recorder.metrics.landed
+    assert recorder.metrics.landed is (when == "never")
+
+
+def test_the_chest_must_be_upright_when_the_stand_time_is_over():
+    """Not before: the crouch itself leans by 30 deg."""
+    for tilt, landed in ((31.0, False), (29.0, True)):
+        recorder = JumpRecorder(LIMITS, 0.3)
+        time = stand(recorder, 0.0, 0.4, chest_tilt=math.radians(35.0))
+        landing = ballistic(recorder, time, 0.886)
+        stand(recorder, landing, 0.31, chest_tilt=math.radians(tilt))
+        assert recorder.metrics.landed is landed
+
+
+def test_chatter_alone_is_no_flight():
+    recorder = JumpRecorder(LIMITS, 0.0)
+    time = stand(recorder, 0.0, 0.4)
+    for i in range(15):
+        recorder.update(state(time + i * DT, 0.5 + 0.2 * i * DT, force=0.0))
+    stand(recorder, time + 15 * DT, 0.1)
+    assert recorder.metrics.flight_height == 0.0
+    assert math.isnan(recorder.metrics.takeoff_time)
+    assert not recorder.stood
 
 
 def test_landed_only_after_the_stand_time():

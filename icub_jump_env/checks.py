@@ -1,0 +1,75 @@
+"""Checks of what users hand in; each refusal names the field, the value and what is allowed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.errors import ActionError, ConfigError
+
+
+def check_choice(field: str, value: Any, allowed: tuple[Any, ...]) -> None:
+    """Refuse anything but one of the ``allowed`` strings (or None, if among them)."""
+    if (value is not None and not isinstance(value, str)) or value not in allowed:
+        raise ConfigError(field, value, f"one of {', '.join(map(repr, allowed))}")
+
+
+def check_flag(field: str, value: Any) -> None:
+    """Refuse anything but a boolean."""
+    if not isinstance(value, bool | np.bool_):
+        raise ConfigError(field, value, "True or False")
+
+
+def check_number(field: str, value: Any, low: float, high: float) -> float:
+    """Refuse anything but a real number from ``low`` to ``high``; return it as a float."""
+    number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+    # Compared before converting: a float cannot hold every int.
+    if not number or not low <= value <= high:
+        raise ConfigError(field, value, f"a number from {low:g} to {high:g}")
+    return float(value)
+
+
+def check_triple(field: str, value: Any, low: float, high: float) -> tuple[float, float, float]:
+    """Refuse anything but three numbers from ``low`` to ``high``."""
+    try:
+        if not isinstance(value, Sequence | np.ndarray):
+            raise TypeError
+        x, y, z = (check_number(field, item, low, high) for item in value)
+    except (TypeError, ValueError):
+        allowed = f"three numbers from {low:g} to {high:g}: forward, lateral, vertical"
+        raise ConfigError(field, value, allowed) from None
+    return x, y, z
+
+
+def check_seed(seed: Any) -> int | None:
+    """Refuse anything but a whole number from 0, or None."""
+    if seed is None:
+        return None
+    integer = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+    if not integer or seed < 0:
+        raise ConfigError("seed", seed, "a whole number from 0, or None")
+    return int(seed)
+
+
+def check_action(action: Any) -> NDArray[np.float64]:
+    """Refuse anything but three finite numbers in [-1, 1]; return them as float64."""
+    allowed = "three finite numbers in [-1, 1]"
+    try:
+        array = np.asarray(action)
+    except ValueError:  # a ragged list
+        raise ActionError("action", action, allowed) from None
+    numbers = array.dtype.kind in "fiu"
+    if not numbers or array.shape != (3,) or not (np.abs(array) <= 1.0).all():
+        raise ActionError("action", action, allowed)
+    return array.astype(np.float64)
+
+
+def is_multiple(value: float, unit: float) -> bool:
+    """Whether ``value`` is a positive whole multiple of ``unit``, to rounding."""
+    ratio = value / unit
+    return math.isclose(ratio, round(ratio), rel_tol=1e-9) and round(ratio) >= 1

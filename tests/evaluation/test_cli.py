@@ -1,0 +1,214 @@
+"""The command line: what it prints and writes, and how it refuses."""
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.evaluation import cli, video
+from icub_jump_env.evaluation.output import write_json
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def evaluate(capsys, *arguments):
+    """Exit code, stdout and stderr of eval.py with these arguments."""
+    code = 0
+    try:
+        cli.evaluate([*arguments])
+    except SystemExit as end:
+        code = end.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_prints_the_table_and_writes_json_and_figures(capsys, tmp_path):
+    report, figures = tmp_path / "report.json", tmp_path / "figures"
+    code, out, _ = evaluate(
+        capsys, "--stand-time", "0.3", "--json", str(report), "--plot", str(figures)
+    )
+    assert code == 0
+    for column in ("paper", "ours", "difference", "no eq. 3d"):
+        assert column in out
+    for row in ("flight height", "sole height", "take-off velocity", "take-off time",
+                "ballistic height", "rotation", "base pitch", "landed"):  # fmt: skip
+        assert row in out
+    assert "falls" in out or "stands" in out
+
+    content = json.loads(report.read_text(), parse_constant=pytest.fail)
+    assert content["config"]["stand_time"] == 0.3
+    assert content["seed"] == 0
+    assert {"mujoco", "pin", "daqp", "icub-models", "python"} <= set(content["versions"])
+    rises = {
+        name: arm["episodes"][0]["jump"]["flight_height"] for name, arm in content["arms"].items()
+    }
+    flight = next(r for r in content["comparison"] if r["quantity"].startswith("flight height"))
+    assert flight["ours"] == pytest.approx(100 * rises["with"])
+    assert flight["switched"] == pytest.approx(100 * rises["without"])
+    assert flight["difference"] == pytest.approx(flight["ours"] - 3.5)
+    pictures = sorted(figures.glob("*.png"))
+    assert [p.name[:4] for p in pictures] == ["fig1", "fig2", "fig6"]
+    assert all(p.stat().st_size > 20_000 for p in pictures)
+
+
+def test_without_the_constraint_ours_is_the_ablated_jump(capsys):
+    _, out, _ = evaluate(capsys, "--stand-time", "0.2")
+    _, switched, _ = evaluate(capsys, "--stand-time", "0.2", "--no-momentum-control")
+    assert "no eq. 3d" in out
+    assert "with eq. 3d" in switched
+    row, other = (
+        next(line.split() for line in text.splitlines() if "rotation" in line)
+        for text in (out, switched)
+    )
+    assert (row[-3], row[-1]) == (other[-1], other[-3])
+
+
+def test_missing_egl_does_not_matter_without_pictures(tmp_path):
+    """MuJoCo cannot even be imported with MUJOCO_GL=egl and no libEGL."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import ctypes.util\n"
+        "find = ctypes.util.find_library\n"
+        "ctypes.util.find_library = lambda n: None if n in ('EGL', 'GL', 'OpenGL') else find(n)\n"
+        "load = ctypes.CDLL.__init__\n"
+        "def refuse(self, name, *a, **k):\n"
+        "    if name and any(w in str(name) for w in ('libEGL', 'libGL', 'libOpenGL')):\n"
+        "        raise OSError('not here')\n"
+        "    load(self, name, *a, **k)\n"
+        "ctypes.CDLL.__init__ = refuse\n"
+    )
+    environment = {
+        **{k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")},
+        "PYTHONPATH": f"{tmp_path}:{REPOSITORY}",
+    }
+    for arguments, code in ((["--stand-time", "0.1"], 0), (["--video", "jump.mp4"], 2)):
+        result = subprocess.run(
+            [sys.executable, str(REPOSITORY / "eval.py"), *arguments],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert result.returncode == code, result.stderr
+        if code:
+            assert result.stderr.startswith("error: ")
+            assert result.stderr.count("\n") == 1
+            assert "libegl1" in result.stderr
+
+
+def test_episodes_are_seeded_one_by_one(capsys, tmp_path):
+    report = tmp_path / "r.json"
+    evaluate(
+        capsys, "--episodes", "2", "--seed", "7", "--stand-time", "0.1", "--json", str(report)
+    )
+    content = json.loads(report.read_text())
+    assert [e["seed"] for e in content["arms"]["with"]["episodes"]] == [7, 8]
+
+
+def test_every_field_of_the_configuration_is_a_flag_of_the_same_name(capsys):
+    _, out, _ = evaluate(capsys, "--help")
+    for field in dataclasses.fields(JumpConfig):
+        assert f"--{field.name.replace('_', '-')}" in out
+
+
+def test_flags_reach_the_configuration():
+    options = cli.parse(
+        cli.EvalOptions,
+        ["--jump-height", "0.05", "--no-momentum-control", "--residual_scale", "0.01", "0.02",
+         "0.03", "--com-displacement", "0.1", "--solver", "osqp"],
+    )  # fmt: skip
+    assert options.config == JumpConfig(
+        jump_height=0.05,
+        momentum_control=False,
+        residual_scale=(0.01, 0.02, 0.03),
+        com_displacement=0.1,
+        solver="osqp",
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--wings", "2"], ["--wings"]),
+        (["--jump-height", "high"], ["--jump-height", "'high'"]),
+        (["--jump-height", "7"], ["jump_height", "7", "0.005 to 0.15"]),
+        (["--controller", "psychic"], ["--controller", "psychic", "velocity"]),
+        (["--residual-scale", "1"], ["--residual-scale", "3"]),
+        (["--timestep", "nan"], ["timestep", "nan"]),
+        (["--control-frequency", "333"], ["control_frequency", "333", "divisor"]),
+        (["--episodes", "0"], ["episodes", "0", "from 1"]),
+        (["--seed", "-1"], ["seed", "-1", "from 0"]),
+        (["--com-scaling", "acceleration", "--jump-height", "0.1"], ["jump_height", "at most"]),
+        (["--json", "/nowhere/at/all.json"], ["json", "/nowhere/at/all.json", "folder"]),
+        (["--plot", "/dev/null"], ["plot", "/dev/null", "folder"]),
+        (["--video", "jump.txt"], ["video", "jump.txt", ".mp4"]),
+    ],
+)
+def test_refuses_with_one_line_that_names_the_reason(capsys, arguments, words):
+    code, out, err = evaluate(capsys, *arguments)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    for word in words:
+        assert word in err
+
+
+def test_a_missing_extra_names_the_remedy(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio", None)
+    monkeypatch.setitem(sys.modules, "imageio.v3", None)
+    code, _, err = evaluate(capsys, "--video", "jump.mp4")
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "pip install 'icub-jump[video]'" in err
+
+
+def test_missing_opengl_names_the_remedy(monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    with pytest.raises(MissingDependencyError, match="MUJOCO_GL=egl"):
+        video.check_video(Path("jump.mp4"))
+
+
+def test_interrupt_ends_with_one_line(capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("icub_jump_env.evaluation.nominal.run_episode", interrupted)
+    code, _, err = evaluate(capsys)
+    assert code == 130
+    assert err.strip().splitlines()[-1] == "interrupted"
+
+
+def test_json_is_written_completely_or_not_at_all(tmp_path, monkeypatch):
+    file = tmp_path / "report.json"
+    write_json(file, {"a": 1, "nan": float("nan")})
+    assert json.loads(file.read_text()) == {"a": 1, "nan": None}
+
+    def full_disk(_):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(OSError, match="no space"):
+        write_json(file, {"a": 2})
+    assert json.loads(file.read_text())["a"] == 1
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_options_refuse_with_the_field():
+    with pytest.raises(ConfigError) as refusal:
+        cli.EvalOptions(episodes=0)
+    assert refusal.value.field == "episodes"
+
+
+def test_eval_py_runs_from_anywhere(tmp_path):
+    result = subprocess.run(
+        [sys.executable, str(REPOSITORY / "eval.py"), "--jump-height", "9"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert result.returncode == 2
+    assert result.stderr == "error: jump_height=9.0 is not allowed: a number from 0.005 to 0.15\n"

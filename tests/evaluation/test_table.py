@@ -1,0 +1,54 @@
+"""The table's arithmetic."""
+
+import math
+
+import pytest
+
+from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.table import comparison_rows, verdict
+
+
+def episode(**jump):
+    values = {
+        "flight_height": 0.04, "sole_height": 0.05, "takeoff_velocity": 0.9,
+        "takeoff_time": 0.43, "ballistic_height": 0.041, "flight_rotation": math.radians(0.5),
+        "base_pitch_range": math.radians(4.0), "landed": True,
+    }  # fmt: skip
+    return Episode(0, "stood", True, values | jump)
+
+
+def rows(ours, without):
+    return {row.quantity: row for row in comparison_rows(ours, without)}
+
+
+def test_medians_units_and_differences():
+    ours = [episode(flight_height=h) for h in (0.030, 0.036, 0.050)]
+    table = rows(ours, [episode(flight_rotation=math.radians(-10), landed=False)])
+    height = table["flight height (CoM)"]
+    assert (height.paper, height.ours) == pytest.approx((3.5, 3.6))
+    assert height.difference == pytest.approx(0.1)
+    rotation = table["rotation in flight"]
+    assert rotation.paper is None
+    assert rotation.difference is None
+    assert rotation.switched == pytest.approx(-10.0)
+    assert table["landed and stands"].switched == 0.0
+
+
+def test_landing_is_a_share():
+    table = rows([episode(), episode(landed=False)], [episode()])
+    assert table["landed and stands"].ours == 50.0
+
+
+@pytest.mark.parametrize(
+    ("ours", "without", "words"),
+    [
+        ([True], [False], ("constraint (3d) the robot stands", "it falls")),
+        ([True, False], [True], ("stands in 50 %", "it stands")),
+    ],
+)
+def test_verdict(ours, without, words):
+    arms = [[episode(landed=landed) for landed in arm] for arm in (ours, without)]
+    sentence = verdict(comparison_rows(*arms), momentum_control=True)
+    assert verdict(comparison_rows(*arms[::-1]), momentum_control=False) == sentence
+    for word in words:
+        assert word in sentence

@@ -1,0 +1,93 @@
+"""Pictures: in a process of their own, because MuJoCo chooses its OpenGL when imported."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import gymnasium, icub_jump_env, numpy as np
+plain = gymnasium.make("ICubJump-v0")
+pretty = gymnasium.make("ICubJump-v0", render_mode="rgb_array")
+states = []
+for env in (plain, pretty):
+    env.reset(seed=0)
+    first = env.render() if env is pretty else None
+    for _ in range(50):
+        env.step(np.zeros(3, np.float32))
+    states.append(env.unwrapped.data.qpos.copy())
+picture = env.render()
+assert picture.shape == (480, 640, 3) and picture.dtype == np.uint8
+red = (picture[..., 0] > 120) & (picture[..., 1] < 80)
+assert 0.01 < red.mean() < 0.5, "the iCub's red shells should fill part of the picture"
+assert (picture != first).any(), "the robot should have moved"
+assert (states[0] == states[1]).all(), "looks must not change the physics"
+pretty.close(); pretty.close()
+print("rendered")
+"""
+
+
+@pytest.fixture(scope="module")
+def offscreen():
+    probe = (
+        "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>')); print('ok')"
+    )
+    environment = {**os.environ, "MUJOCO_GL": "egl"}
+    result = subprocess.run(
+        [sys.executable, "-c", probe], env=environment, capture_output=True, text=True, check=False
+    )
+    if "ok" not in result.stdout:
+        pytest.skip("no EGL on this machine")
+    return environment
+
+
+def test_pictures_show_the_robot_and_change_nothing(offscreen):
+    result = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=offscreen, capture_output=True, text=True, check=False
+    )
+    assert result.stdout.strip() == "rendered", result.stderr
+
+
+def test_video_is_recorded(offscreen, tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    file = tmp_path / "jump.mp4"
+    program = (
+        "from icub_jump_env.evaluation.video import record_video\n"
+        "from icub_jump_env.config import JumpConfig\n"
+        "from rich.console import Console\n"
+        "from pathlib import Path\n"
+        "import imageio.v3 as iio\n"
+        f"file = Path({str(file)!r})\n"
+        "record_video(file, JumpConfig(stand_time=0.1), 0, Console(stderr=True))\n"
+        "print(*iio.imread(file).shape)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", program], env=offscreen, check=True, capture_output=True, text=True
+    )
+    frames, *shape = (int(word) for word in result.stdout.split())
+    assert 65 < frames < 85  # 0.73 s at 100 pictures a second
+    assert shape == [480, 640, 3]
+
+
+@pytest.mark.parametrize("mode", ["rgb_array", "human"])
+def test_without_a_display_the_error_names_the_remedy(mode):
+    program = (
+        "import gymnasium, icub_jump_env\n"
+        f"env = gymnasium.make('ICubJump-v0', render_mode={mode!r})\n"
+        "try:\n"
+        "    env.reset(seed=0); env.render()\n"
+        "except icub_jump_env.MissingDependencyError as error:\n"
+        "    print(error)\n"
+    )
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
+    }
+    result = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert {"rgb_array": "MUJOCO_GL=egl", "human": "needs a display"}[mode] in result.stdout
