@@ -34,16 +34,17 @@ def check_number(field: str, value: Any, low: float, high: float) -> float:
     return float(value)
 
 
-def check_triple(field: str, value: Any, low: float, high: float) -> tuple[float, float, float]:
-    """Refuse anything but three numbers from ``low`` to ``high``."""
+def check_numbers(
+    field: str, values: Any, length: int, low: float, high: float
+) -> tuple[float, ...]:
+    """Refuse anything but ``length`` numbers from ``low`` to ``high``."""
+    allowed = f"{length} numbers from {low:g} to {high:g}"
+    if not isinstance(values, Sequence | np.ndarray) or len(values) != length:
+        raise ConfigError(field, values, allowed)
     try:
-        if not isinstance(value, Sequence | np.ndarray):
-            raise TypeError
-        x, y, z = (check_number(field, item, low, high) for item in value)
-    except (TypeError, ValueError):
-        allowed = f"three numbers from {low:g} to {high:g}: forward, lateral, vertical"
-        raise ConfigError(field, value, allowed) from None
-    return x, y, z
+        return tuple(check_number(field, value, low, high) for value in values)
+    except ConfigError:
+        raise ConfigError(field, values, allowed) from None
 
 
 def check_seed(seed: Any) -> int | None:

@@ -11,7 +11,7 @@ from icub_jump_env.checks import (
     check_choice,
     check_flag,
     check_number,
-    check_triple,
+    check_numbers,
     is_multiple,
 )
 from icub_jump_env.control.solvers import SolverName
@@ -91,7 +91,7 @@ class JumpConfig:
             )
         self._store(
             "residual_scale",
-            check_triple("residual_scale", self.residual_scale, *RESIDUAL_RANGE),
+            check_numbers("residual_scale", self.residual_scale, 3, *RESIDUAL_RANGE),
         )
         self._store("timestep", check_number("timestep", self.timestep, *TIMESTEP_RANGE))
         self._store("stand_time", check_number("stand_time", self.stand_time, *STAND_TIME_RANGE))

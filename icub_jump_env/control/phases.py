@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from icub_jump_env.checks import check_number
+
 
 class Phase(IntEnum):
     """Launching, aerial and landing phase."""
@@ -24,11 +26,20 @@ class ContactThresholds:
         touch_down: Total normal force (N) above which an airborne robot has landed.
         lift_off_ticks: Consecutive control ticks below ``lift_off`` that make a
             lift-off; a single one is chatter.
+
+    Raises:
+        ConfigError: If a value is out of range.
     """
 
     lift_off: float = 10.0
     touch_down: float = 30.0
     lift_off_ticks: int = 2
+
+    def __post_init__(self) -> None:
+        check_number("lift_off", self.lift_off, 0.0, 1e4)
+        # Below the lift-off force, a robot about to take off would count as landed.
+        check_number("touch_down", self.touch_down, self.lift_off, 1e4)
+        check_number("lift_off_ticks", self.lift_off_ticks, 1, 1000)
 
 
 class PhaseMachine:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.checks import check_number, check_numbers
 from icub_jump_env.control.command import QPReport
 from icub_jump_env.control.qp import (
     QPResiduals,
@@ -50,6 +51,9 @@ class VelocityGains:
             The paper takes one control period, in which no joint can stop.
         velocity_margin: Share of the speed limits that the QP may use; the rest is for
             the servos' overshoot.
+
+    Raises:
+        ConfigError: If a value is out of range.
     """
 
     posture: float = 1.0
@@ -61,6 +65,18 @@ class VelocityGains:
     momentum_weight: float = 1e3
     limit_horizon: float = 0.02
     velocity_margin: float = 0.98
+
+    def __post_init__(self) -> None:
+        n = facts.N_JOINTS
+        for field in ("posture", "com", "momentum"):
+            check_number(field, getattr(self, field), 0.0, 1e3)
+        # One of the two must be positive, or the QP has no unique solution.
+        check_numbers("posture_weight", self.posture_weight, n, 1e-6, 1e6)
+        check_numbers("smoothness_weight", self.smoothness_weight, n, 0.0, 1e6)
+        check_number("com_weight", self.com_weight, 0.0, 1e8)
+        check_number("momentum_weight", self.momentum_weight, 0.0, 1e8)
+        check_number("limit_horizon", self.limit_horizon, 0.0, 1.0)
+        check_number("velocity_margin", self.velocity_margin, 0.01, 1.0)
 
 
 class VelocityController:

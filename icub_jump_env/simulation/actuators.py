@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.checks import check_number
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.robot import facts
 
@@ -23,11 +24,19 @@ class ServoGains:
         damping: Torque per velocity error (Nm s/rad).
         speed_band: Over this share of the speed limit, above it, the available torque
             falls to zero.
+
+    Raises:
+        ConfigError: If a value is out of range.
     """
 
     stiffness: float = 1500.0
     damping: float = 50.0
     speed_band: float = 0.03
+
+    def __post_init__(self) -> None:
+        check_number("stiffness", self.stiffness, 1e-3, 1e6)
+        check_number("damping", self.damping, 0.0, 1e5)
+        check_number("speed_band", self.speed_band, 1e-3, 1.0)
 
 
 class JointServo:

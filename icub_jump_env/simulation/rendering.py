@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any, Protocol
 
 import mujoco
@@ -68,17 +69,22 @@ class PictureRenderer:
 
 
 class WindowRenderer:
-    """Shows the state in MuJoCo's interactive viewer."""
+    """Shows the state in MuJoCo's interactive viewer, at most as fast as real time."""
 
     def __init__(self, physics: Physics) -> None:
         self._physics = physics
         self._viewer: Any = None
+        self._shown = 0.0, 0.0
 
     def render(self) -> None:
-        """Bring the window up to date."""
+        """Bring the window up to date when it is time."""
         if self._viewer is None:
             self._viewer = self._open()
+        simulated, now = self._physics.data.time, time.monotonic()
+        last_simulated, last_shown = self._shown
+        time.sleep(max(0.0, min(simulated - last_simulated, 1.0) - (now - last_shown)))
         self._viewer.sync()
+        self._shown = simulated, time.monotonic()
 
     def _open(self) -> Any:
         if not has_display():

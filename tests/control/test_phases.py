@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from icub_jump_env.control.jump import landing_posture
 from icub_jump_env.control.minimum_jerk import MinimumJerk
-from icub_jump_env.control.phases import Phase, PhaseMachine
+from icub_jump_env.control.phases import ContactThresholds, Phase, PhaseMachine
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.robot import facts
 
 T = 0.43
@@ -51,6 +52,15 @@ def test_flight_ends_at_the_first_contact_after_lift_off():
 def test_phases_only_move_forward(forces):
     phases = run(forces)
     assert phases == sorted(phases)
+
+
+@pytest.mark.parametrize(
+    "values", [{"lift_off": -1.0}, {"touch_down": 5.0}, {"lift_off_ticks": 0}]
+)
+def test_bad_thresholds_are_refused(values):
+    with pytest.raises(ConfigError) as refusal:
+        ContactThresholds(**values)
+    assert refusal.value.field in values
 
 
 def test_reset_starts_over():

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from icub_jump_env.control.qp import QPSolution, QPStatus
 from icub_jump_env.control.velocity import VelocityController, VelocityGains
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.robot import facts
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
@@ -278,6 +279,20 @@ def test_feet_and_limits_that_contradict_each_other_are_a_counted_failure():
     horizon = VelocityGains().limit_horizon
     assert (command[facts.LEFT_LEG] >= 0.02 / horizon - 1e-9).all()
     assert (command[facts.RIGHT_LEG] <= -0.02 / horizon + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("com", -1.0), ("momentum", np.nan), ("posture_weight", (1.0,) * 22),
+        ("posture_weight", (0.0,) * 23), ("smoothness_weight", 1.0), ("com_weight", "big"),
+        ("velocity_margin", 1.5), ("limit_horizon", -0.1),
+    ],
+)  # fmt: skip
+def test_bad_gains_are_refused(field, value):
+    with pytest.raises(ConfigError) as refusal:
+        dataclasses.replace(VelocityGains(), **{field: value})
+    assert refusal.value.field == field
 
 
 def test_reset_makes_a_controller_as_new():

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icub_jump_env.control.command import JointCommand
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.robot import facts
 from icub_jump_env.simulation.actuators import JointServo, ServoGains
 
@@ -79,10 +80,16 @@ def test_does_not_wind_up():
     assert steps * DT <= 0.02
 
 
-@pytest.mark.parametrize("attribute", ["velocity_command"])
-def test_reset_forgets_the_command(attribute):
+@pytest.mark.parametrize("values", [{"stiffness": 0.0}, {"damping": -1.0}, {"speed_band": 0.0}])
+def test_bad_gains_are_refused(values):
+    with pytest.raises(ConfigError) as refusal:
+        ServoGains(**values)
+    assert refusal.value.field in values
+
+
+def test_reset_forgets_the_command():
     servo = JointServo(DT)
     servo.command(JointCommand(facts.VELOCITY_LIMIT))
     servo.reset(zeros, zeros)
-    assert not getattr(servo, attribute).any()
+    assert not servo.velocity_command.any()
     assert not servo.torque(zeros, zeros).any()
