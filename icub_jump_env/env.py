@@ -180,8 +180,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         super().reset(seed=check_seed(seed))
         self._episode = episode
         self._settle()
-        self._sensors.read()
-        self._estimator.update(self._sensors.joint_position, self._sensors.joint_velocity)
+        self._sense()
         self._start_com[:] = self._estimator.com
         trajectory = plan_com_trajectory(
             episode.jump_height, episode.com_displacement, episode.com_scaling
@@ -270,6 +269,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        self._sense()
         if self.render_mode is not None:
             self._renderer = make_renderer(self._physics, self.render_mode)
 
@@ -278,8 +278,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if physics.diverged or not physics.valid:
             self._outcome = "diverged"
             return
-        sensors.read()
-        self._estimator.update(sensors.joint_position, sensors.joint_velocity)
         tick = self._controller.tick(
             physics.data.time,
             self._estimator,
@@ -299,7 +297,14 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._recorder.update(self._truth.read())
             self._outcome = self._judge()
             if self._outcome != "running":
-                return
+                break
+        self._sense()
+
+    def _sense(self) -> None:
+        """Take sensor readings and the estimates made of them, once per control tick."""
+        sensors = self._sensors
+        sensors.read()
+        self._estimator.update(sensors.joint_position, sensors.joint_velocity)
 
     def _judge(self) -> str:
         truth = self._truth.state
@@ -333,8 +338,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _observe(self) -> None:
         sensors, estimator, controller = self._sensors, self._estimator, self._controller
-        sensors.read()
-        estimator.update(sensors.joint_position, sensors.joint_velocity)
         phase, trajectory = controller.phases.phase, controller.trajectory
         reference, time = controller.reference, self._physics.data.time
         one_hot = np.zeros(len(Phase))

@@ -22,7 +22,7 @@ AFTER_LANDING = 0.6
 
 FORMATS = (".mp4", ".gif")
 
-_REMEDY = "writing video needs the extra 'video': pip install 'icub-jump[video]'"
+_REMEDY = "writing video needs the extra 'video': pip install imageio imageio-ffmpeg"
 
 
 def check_video(file: Path) -> None:

@@ -162,7 +162,7 @@ def test_a_missing_extra_names_the_remedy(capsys, monkeypatch):
     code, _, err = evaluate(capsys, "--video", "jump.mp4")
     assert code == 2
     assert err.count("\n") == 1
-    assert "pip install 'icub-jump[video]'" in err
+    assert "pip install imageio imageio-ffmpeg" in err
 
 
 def test_missing_opengl_names_the_remedy(monkeypatch):
