@@ -86,7 +86,7 @@ def evaluate(arguments: Sequence[str]) -> None:
 
 
 def _evaluate(options: EvalOptions) -> None:
-    import_mujoco(offscreen=options.video is not None)
+    import_mujoco()
     # Imported here so that --help and bad arguments answer at once.
     from icub_jump_env.evaluation.nominal import nominal_report, run_nominal
     from icub_jump_env.evaluation.output import check_writable, write_json

@@ -12,7 +12,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.rollout import make_env, run_episode
-from icub_jump_env.simulation.opengl import check_offscreen
+from icub_jump_env.simulation.opengl import open_context
 
 SLOW_MOTION = 4
 """Playback is this many times slower than real time."""
@@ -39,7 +39,7 @@ def check_video(file: Path) -> None:
         import imageio_ffmpeg  # noqa: F401
     except ImportError as error:
         raise MissingDependencyError(_REMEDY) from error
-    check_offscreen()
+    open_context(1, 1).free()
 
 
 def record_video(file: Path, config: JumpConfig, seed: int, console: Console) -> None:

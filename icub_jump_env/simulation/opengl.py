@@ -1,15 +1,18 @@
-"""Which OpenGL MuJoCo uses. It chooses when it is imported, so this module does not import it."""
+"""OpenGL for rendering off screen, and what to do where there is none.
+
+MuJoCo chooses its OpenGL when it is imported, so this module imports it late.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
+from typing import Any
 
 from icub_jump_env.errors import MissingDependencyError
 
-NO_OPENGL = (
-    "no OpenGL to render with; on a machine without a display install libegl1 and libgl1 "
-    "(Debian names) and set MUJOCO_GL=egl before Python starts"
+_REMEDY = (
+    "install libegl1 and libgl1 (Debian names), or set MUJOCO_GL=osmesa and install libosmesa6"
 )
 
 
@@ -20,32 +23,37 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def check_offscreen() -> None:
-    """Refuse early if MuJoCo would look for a display that is not there.
-
-    Raises:
-        MissingDependencyError: Naming the remedy.
-    """
-    if not has_display() and os.environ.get("MUJOCO_GL", "") in ("", "glfw"):
-        raise MissingDependencyError(NO_OPENGL)
-
-
-def import_mujoco(offscreen: bool) -> None:
+def import_mujoco() -> None:
     """Import MuJoCo for a command line.
 
-    Args:
-        offscreen: Whether pictures will be rendered. Without a display that takes EGL,
-            which is chosen unless ``MUJOCO_GL`` says otherwise.
-
     Raises:
-        MissingDependencyError: If MuJoCo cannot load the OpenGL it was told to use.
+        MissingDependencyError: If MuJoCo cannot load the OpenGL that MUJOCO_GL names.
     """
-    if offscreen and not has_display():
-        os.environ.setdefault("MUJOCO_GL", "egl")
     try:
         import mujoco  # noqa: F401
     except Exception as error:  # each OpenGL backend fails in its own way
+        backend = os.environ.get("MUJOCO_GL", "")
         raise MissingDependencyError(
-            f"MuJoCo cannot start with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')!r} ({error}); "
-            "install libegl1 and libgl1 (Debian names) for egl, or unset MUJOCO_GL"
+            f"MuJoCo cannot start with MUJOCO_GL={backend!r} ({error}); unset it, or {_REMEDY}"
         ) from error
+
+
+def open_context(width: int, height: int) -> Any:
+    """Open a current off-screen OpenGL context; EGL without a display, else MuJoCo's choice.
+
+    Raises:
+        MissingDependencyError: If there is no OpenGL; the message names the remedy.
+    """
+    backend = os.environ.get("MUJOCO_GL", "")
+    if not has_display() and backend == "glfw":
+        raise MissingDependencyError("MUJOCO_GL=glfw needs a display; unset it to render with EGL")
+    try:
+        if not has_display() and not backend:
+            from mujoco.egl import GLContext
+        else:
+            from mujoco.gl_context import GLContext
+        context = GLContext(width, height)
+        context.make_current()
+    except Exception as error:  # each OpenGL backend fails in its own way
+        raise MissingDependencyError(f"no OpenGL to render with ({error}): {_REMEDY}") from error
+    return context

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.robot.mujoco_model import CAMERA
-from icub_jump_env.simulation.opengl import NO_OPENGL, check_offscreen, has_display
+from icub_jump_env.simulation.opengl import has_display, open_context
 from icub_jump_env.simulation.physics import Physics
 
 HEIGHT, WIDTH = 480, 640
+MAX_GEOMS = 1000
 
 
 class Renderer(Protocol):
@@ -42,30 +43,42 @@ class PictureRenderer:
     """Renders off screen; opens its graphics context with the first picture."""
 
     def __init__(self, physics: Physics, height: int = HEIGHT, width: int = WIDTH) -> None:
-        self._physics = physics
-        self._height, self._width = height, width
-        self._renderer: Any = None
+        self._model, self._data = physics.model, physics.data
+        self._viewport = mujoco.MjrRect(0, 0, width, height)
+        self._scene = mujoco.MjvScene(self._model, MAX_GEOMS)
+        self._options = mujoco.MjvOption()
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._camera.fixedcamid = self._model.camera(CAMERA).id
+        self._opengl: Any = None
+        self._graphics: Any = None
 
     def render(self) -> NDArray[np.uint8]:
         """A picture of the present state, (height, width, 3)."""
-        if self._renderer is None:
-            self._renderer = self._open()
-        self._renderer.update_scene(self._physics.data, CAMERA)
-        picture: NDArray[np.uint8] = self._renderer.render()
-        return picture
+        if self._opengl is None:
+            self._open()
+        self._opengl.make_current()
+        mujoco.mjv_updateScene(
+            self._model, self._data, self._options, None, self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL, self._scene,
+        )  # fmt: skip
+        mujoco.mjr_render(self._viewport, self._scene, self._graphics)
+        picture = np.empty((self._viewport.height, self._viewport.width, 3), np.uint8)
+        mujoco.mjr_readPixels(picture, None, self._viewport, self._graphics)
+        return np.flipud(picture).copy()  # OpenGL starts at the bottom
 
-    def _open(self) -> Any:
-        check_offscreen()
-        try:
-            return mujoco.Renderer(self._physics.model, self._height, self._width)
-        except Exception as error:  # each GL backend has exceptions of its own
-            raise MissingDependencyError(f"{NO_OPENGL} ({error})") from error
+    def _open(self) -> None:
+        self._opengl = open_context(self._viewport.width, self._viewport.height)
+        self._graphics = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_150)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._graphics)
 
     def close(self) -> None:
         """Free the graphics context."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        if self._opengl is not None:
+            self._opengl.make_current()
+            self._graphics.free()
+            self._opengl.free()
+            self._opengl = self._graphics = None
 
 
 class WindowRenderer:

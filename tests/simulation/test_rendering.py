@@ -70,8 +70,11 @@ def test_video_is_recorded(offscreen, tmp_path):
     assert shape == [480, 640, 3]
 
 
-@pytest.mark.parametrize("mode", ["rgb_array", "human"])
-def test_without_a_display_the_error_names_the_remedy(mode):
+@pytest.mark.parametrize(
+    ("mode", "backend", "remedy"),
+    [("human", "", "needs a display"), ("rgb_array", "glfw", "unset it to render with EGL")],
+)
+def test_without_a_display_the_error_names_the_remedy(mode, backend, remedy):
     program = (
         "import gymnasium, icub_jump_env\n"
         f"env = gymnasium.make('ICubJump-v0', render_mode={mode!r})\n"
@@ -80,9 +83,9 @@ def test_without_a_display_the_error_names_the_remedy(mode):
         "except icub_jump_env.MissingDependencyError as error:\n"
         "    print(error)\n"
     )
-    environment = {
-        k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
-    }
+    display = ("DISPLAY", "WAYLAND_DISPLAY")
+    environment = {k: v for k, v in os.environ.items() if k not in display}
+    environment["MUJOCO_GL"] = backend
     result = subprocess.run(
         [sys.executable, "-c", program],
         env=environment,
@@ -90,4 +93,17 @@ def test_without_a_display_the_error_names_the_remedy(mode):
         text=True,
         check=True,
     )
-    assert {"rgb_array": "MUJOCO_GL=egl", "human": "needs a display"}[mode] in result.stdout
+    assert remedy in result.stdout
+
+
+def test_two_environments_render_side_by_side(offscreen):
+    program = (
+        "import gymnasium, icub_jump_env, numpy as np\n"
+        "envs = [gymnasium.make('ICubJump-v0', render_mode='rgb_array') for _ in range(2)]\n"
+        "pictures = [(env.reset(seed=0), env.render())[1] for env in envs]\n"
+        "assert (pictures[0] == pictures[1]).all()\n"
+        "envs[0].close()\n"
+        "assert np.abs(envs[1].render().astype(int) - pictures[1]).max() <= 1\n"
+        "envs[1].close()\n"
+    )
+    subprocess.run([sys.executable, "-c", program], env=offscreen, check=True)
