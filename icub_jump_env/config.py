@@ -22,8 +22,11 @@ from icub_jump_env.reference.com_trajectory import (
     plan_com_trajectory,
 )
 
-ControllerName = Literal["velocity"]
+ControllerName = Literal["velocity", "torque"]
 RenderMode = Literal["rgb_array", "human"]
+
+CONTROL_RATES: dict[ControllerName, float] = {"velocity": 200.0, "torque": 500.0}
+"""Default rate (Hz) of each controller."""
 
 JUMP_HEIGHT_RANGE = (0.005, 0.15)
 DISPLACEMENT_RANGE = (0.03, MAX_DISPLACEMENT)
@@ -49,7 +52,8 @@ class JumpConfig:
         residual_scale: Largest offset of the CoM reference that an action can ask for:
             forward, lateral, vertical (m).
         timestep: Physics step (s).
-        control_frequency: Rate of the controller (Hz), a divisor of the physics rate.
+        control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
+            default 200 for the velocity controller and 500 for the torque controller.
         agent_frequency: Rate of ``env.step`` (Hz), a divisor of the control rate.
         stand_time: How long the robot must stand after touch-down (s).
         ankle_shift: Move the ankle pitch range by -15 deg, as the paper did.
@@ -68,7 +72,7 @@ class JumpConfig:
     solver: SolverName = "daqp"
     residual_scale: tuple[float, float, float] = (0.06, 0.02, 0.02)
     timestep: float = 0.001
-    control_frequency: float = 200.0
+    control_frequency: float | None = None
     agent_frequency: float = 100.0
     stand_time: float = 2.0
     ankle_shift: bool = True
@@ -102,21 +106,33 @@ class JumpConfig:
         object.__setattr__(self, field, value)
 
     def _check_rates(self) -> None:
-        rate = 1.0 / self.timestep
-        for field, limits in (
-            ("control_frequency", (1.0, rate)),
-            ("agent_frequency", AGENT_FREQUENCY_RANGE),
-        ):
-            frequency = check_number(field, getattr(self, field), *limits)
-            if not is_multiple(rate, frequency):
-                raise ConfigError(field, frequency, f"a divisor of {rate:g} Hz, the rate below it")
-            self._store(field, frequency)
-            rate = frequency
+        physics = 1.0 / self.timestep
+        if self.control_frequency is not None:
+            frequency = check_number("control_frequency", self.control_frequency, 1.0, physics)
+            self._store("control_frequency", frequency)
+        control = self.control_rate
+        if not is_multiple(physics, control):
+            raise ConfigError(
+                "control_frequency", control, f"a divisor of the physics rate of {physics:g} Hz"
+            )
+        agent = check_number("agent_frequency", self.agent_frequency, *AGENT_FREQUENCY_RANGE)
+        if not is_multiple(control, agent):
+            raise ConfigError(
+                "agent_frequency", agent, f"a divisor of the control rate of {control:g} Hz"
+            )
+        self._store("agent_frequency", agent)
+
+    @property
+    def control_rate(self) -> float:
+        """Rate of the controller (Hz)."""
+        if self.control_frequency is None:
+            return CONTROL_RATES[self.controller]
+        return self.control_frequency
 
     @property
     def control_dt(self) -> float:
         """Control period T_s (s)."""
-        return 1.0 / self.control_frequency
+        return 1.0 / self.control_rate
 
     @property
     def physics_per_control(self) -> int:
@@ -126,7 +142,7 @@ class JumpConfig:
     @property
     def controls_per_step(self) -> int:
         """Control ticks per ``env.step``."""
-        return round(self.control_frequency / self.agent_frequency)
+        return round(self.control_rate / self.agent_frequency)
 
     @classmethod
     def from_kwargs(cls, kwargs: Mapping[str, Any]) -> Self:

@@ -14,15 +14,17 @@ from scipy.spatial.transform import Rotation
 from icub_jump_env import observation
 from icub_jump_env.checks import check_action, check_seed
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.control.command import QPReport
-from icub_jump_env.control.jump import JumpController
+from icub_jump_env.control.jump import JumpController, LaunchController
 from icub_jump_env.control.phases import Phase
+from icub_jump_env.control.qp import QPReport
+from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.metrics.jump import JointLimits, JumpRecorder
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot import facts
+from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.statics import holding_torque
@@ -124,17 +126,10 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         limits = self._joint_limits()
         self._recorder = JumpRecorder(limits, cfg.stand_time)
         self._crouch = facts.crouch(cfg.ankle_shift)
-        launch = VelocityController(
-            self._crouch,
-            (limits.lower_position, limits.upper_position),
-            cfg.control_dt,
-            cfg.momentum_control,
-            cfg.solver,
-        )
-        self._controller = JumpController(launch, self._crouch, cfg.control_dt)
         crouch_q = self._crouch_configuration()
         self._crouch_qpos = mujoco_qpos(crouch_q)
         self._crouch_torque = holding_torque(crouch_q)
+        self._controller = JumpController(self._make_launch(limits), self._crouch, cfg.control_dt)
         self._residual_scale = np.array(cfg.residual_scale)
         self._start_com = np.zeros(3)
         self._episode = cfg
@@ -250,6 +245,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             joint_velocity=truth.joint_velocity.copy(),
             joint_velocity_command=self._servo.velocity_command.copy(),
             joint_torque=truth.joint_torque.copy(),
+            joint_torque_command=self._servo.torque_command.copy(),
             com=truth.com.copy(),
             com_velocity=truth.com_velocity.copy(),
             com_reference=reference.copy(),
@@ -282,6 +278,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             physics.data.time,
             self._estimator,
             sensors.joint_position,
+            sensors.joint_velocity,
             float(sensors.foot_force.sum()),
             residual_target,
         )
@@ -331,6 +328,22 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         kinematics.update(self._crouch)
         quaternion = Rotation.from_matrix(kinematics.base_rotation).as_quat()
         return np.concatenate((kinematics.base_position, quaternion, self._crouch))
+
+    def _make_launch(self, limits: JointLimits) -> LaunchController:
+        cfg = self.config
+        positions = limits.lower_position, limits.upper_position
+        if cfg.controller == "torque":
+            return TorqueController(
+                self._crouch,
+                self._crouch_torque,
+                positions,
+                FeetFixedDynamics(self._estimator.kinematics),
+                cfg.momentum_control,
+                cfg.solver,
+            )
+        return VelocityController(
+            self._crouch, positions, cfg.control_dt, cfg.momentum_control, cfg.solver
+        )
 
     def _joint_limits(self) -> JointLimits:
         lower, upper = self._physics.model.jnt_range[1:].T

@@ -21,6 +21,8 @@ class Snapshot:
         joint_velocity: (23,) rad/s.
         joint_velocity_command: (23,) latest command to the servos (rad/s).
         joint_torque: (23,) Nm.
+        joint_torque_command: (23,) latest torque command (Nm); NaN in other modes than
+            torque control.
         com: (3,) true CoM position (m).
         com_velocity: (3,) true CoM velocity (m/s).
         com_reference: (3,) CoM reference (m); NaN after the launching phase.
@@ -34,6 +36,7 @@ class Snapshot:
     joint_velocity: Array
     joint_velocity_command: Array
     joint_torque: Array
+    joint_torque_command: Array
     com: Array
     com_velocity: Array
     com_reference: Array

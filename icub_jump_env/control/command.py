@@ -1,4 +1,4 @@
-"""What a controller hands to the joint servos, and what it says about itself."""
+"""What a controller hands to the joint servos."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.qp import QPResiduals, QPStatus
+from icub_jump_env.robot import facts
 
 Array = NDArray[np.float64]
+
+_AT_REST = np.zeros(facts.N_JOINTS)
 
 
 class JointCommand(NamedTuple):
@@ -19,26 +21,10 @@ class JointCommand(NamedTuple):
         velocity: (23,) desired joint velocities (rad/s).
         position: (23,) desired joint positions (rad) now, or ``None`` for velocity
             control, where the servo integrates the velocity itself.
+        torque: (23,) joint torques (Nm) for torque control, which passes by position
+            and velocity; else ``None``.
     """
 
-    velocity: Array
+    velocity: Array = _AT_REST
     position: Array | None = None
-
-
-class QPReport(NamedTuple):
-    """How the QP of a control tick went.
-
-    Attributes:
-        status: Status after the check of the residuals.
-        residuals: Residuals computed outside the solver.
-        iterations: Solver iterations.
-    """
-
-    status: QPStatus
-    residuals: QPResiduals
-    iterations: int
-
-    @property
-    def failed(self) -> bool:
-        """Whether the solution was not applied."""
-        return self.status is not QPStatus.SOLVED
+    torque: Array | None = None

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.command import JointCommand, QPReport
+from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.minimum_jerk import MinimumJerk
 from icub_jump_env.control.phases import Phase, PhaseMachine
-from icub_jump_env.control.velocity import VelocityController
+from icub_jump_env.control.qp import QPReport
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.reference.com_reference import ComReference
 from icub_jump_env.reference.com_trajectory import PAPER_DISPLACEMENT, ComTrajectory
@@ -30,6 +30,40 @@ def landing_posture(crouch: Array, displacement: float) -> Array:
     """
     share = min(1.0, displacement / PAPER_DISPLACEMENT)
     return crouch + share * (facts.LANDING - crouch)
+
+
+class LaunchController(Protocol):
+    """Decides the joints in the launching phase.
+
+    Attributes:
+        report: How the latest tick's QP went.
+    """
+
+    report: QPReport
+
+    def reset(self) -> None:
+        """Forget everything about earlier ticks."""
+        ...
+
+    def command(
+        self,
+        estimator: FeetFixedEstimator,
+        joint_position: Array,
+        joint_velocity: Array,
+        reference: ComReference,
+    ) -> JointCommand:
+        """One control tick.
+
+        Args:
+            estimator: Estimates for the present encoder readings.
+            joint_position: (23,) encoder readings (rad).
+            joint_velocity: (23,) encoder readings (rad/s).
+            reference: CoM reference at the present time.
+
+        Returns:
+            The command until the next tick.
+        """
+        ...
 
 
 class Tick(NamedTuple):
@@ -55,7 +89,7 @@ class JumpController:
         trajectory: The planned CoM trajectory of this jump.
     """
 
-    def __init__(self, launch: VelocityController, crouch: Array, dt: float) -> None:
+    def __init__(self, launch: LaunchController, crouch: Array, dt: float) -> None:
         """Set up the controller.
 
         Args:
@@ -90,6 +124,7 @@ class JumpController:
         time: float,
         estimator: FeetFixedEstimator,
         joint_position: Array,
+        joint_velocity: Array,
         normal_force: float,
         residual_target: Array,
     ) -> Tick:
@@ -99,6 +134,7 @@ class JumpController:
             time: Time since the start of the launch (s).
             estimator: Estimates for the present encoder readings.
             joint_position: (23,) encoder readings (rad).
+            joint_velocity: (23,) encoder readings (rad/s).
             normal_force: Total measured normal force under the feet (N).
             residual_target: (3,) target offset of the CoM reference (m); acts in the
                 launching phase only.
@@ -110,10 +146,10 @@ class JumpController:
         if phase is Phase.LAUNCH:
             self.reference.update(time)
             self.reference.residual.step(residual_target, self._dt)
-            velocity = self._launch.update(
-                estimator, joint_position, self.reference.position, self.reference.velocity
+            command = self._launch.command(
+                estimator, joint_position, joint_velocity, self.reference
             )
-            return Tick(phase, JointCommand(velocity), self._launch.report)
+            return Tick(phase, command, self._launch.report)
 
         if self._flight is None:
             goal = landing_posture(self._crouch, self.trajectory.displacement)

@@ -90,6 +90,37 @@ class QPTolerances(NamedTuple):
     dual: float
     gap: float
 
+    def accept(self, residuals: QPResiduals) -> bool:
+        """Whether all residuals are within the tolerances; NaN is not."""
+        return (
+            residuals.primal <= self.primal
+            and residuals.dual <= self.dual
+            and residuals.gap <= self.gap
+        )
+
+
+class QPReport(NamedTuple):
+    """How the QP of a control tick went.
+
+    Attributes:
+        status: Status after the check of the residuals.
+        residuals: Residuals computed outside the solver.
+        iterations: Solver iterations.
+    """
+
+    status: QPStatus
+    residuals: QPResiduals
+    iterations: int
+
+    @property
+    def failed(self) -> bool:
+        """Whether the solution was not applied."""
+        return self.status is not QPStatus.SOLVED
+
+
+IDLE = QPReport(QPStatus.SOLVED, QPResiduals(0.0, 0.0, 0.0), 0)
+"""Report before the first tick."""
+
 
 def check_solution(problem: QuadraticProgram, solution: QPSolution) -> QPResiduals:
     """Primal and dual residual and duality gap of a solution.

@@ -9,7 +9,14 @@ import numpy as np
 import osqp
 import scipy.sparse as sp
 
-from icub_jump_env.control.qp import QPSolution, QPStatus, QPTolerances, QuadraticProgram
+from icub_jump_env.control.qp import (
+    QPReport,
+    QPSolution,
+    QPStatus,
+    QPTolerances,
+    QuadraticProgram,
+    check_solution,
+)
 
 SolverName = Literal["daqp", "osqp"]
 
@@ -134,6 +141,23 @@ SOLVERS: dict[SolverName, type[DAQPSolver] | type[OSQPSolver]] = {
     "daqp": DAQPSolver,
     "osqp": OSQPSolver,
 }
+
+
+class CheckedSolver:
+    """A solver whose answers are checked outside of it: its failures are data."""
+
+    def __init__(self, name: SolverName, problem: QuadraticProgram) -> None:
+        self._problem = problem
+        self._solver = make_solver(name, problem)
+
+    def solve(self) -> tuple[QPSolution, QPReport]:
+        """Solve the problem as it stands; apply the solution only if the report allows."""
+        solution = self._solver.solve()
+        residuals = check_solution(self._problem, solution)
+        status = solution.status
+        if status is QPStatus.SOLVED and not self._solver.tolerances.accept(residuals):
+            status = QPStatus.REJECTED
+        return solution, QPReport(status, residuals, solution.iterations)
 
 
 def make_solver(name: SolverName, problem: QuadraticProgram) -> QPSolver:

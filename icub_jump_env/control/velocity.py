@@ -16,16 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_number, check_numbers
-from icub_jump_env.control.command import QPReport
-from icub_jump_env.control.qp import (
-    QPResiduals,
-    QPStatus,
-    QPTolerances,
-    QuadraticProgram,
-    check_solution,
-)
-from icub_jump_env.control.solvers import SolverName, make_solver
+from icub_jump_env.control.command import JointCommand
+from icub_jump_env.control.qp import IDLE, QuadraticProgram
+from icub_jump_env.control.solvers import CheckedSolver, SolverName
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
+from icub_jump_env.reference.com_reference import ComReference
 from icub_jump_env.robot import facts
 
 Array = NDArray[np.float64]
@@ -109,7 +104,7 @@ class VelocityController:
         n = facts.N_JOINTS
         problem = QuadraticProgram(n, n_inequalities=0, n_equalities=6)
         self.problem = problem
-        self._solver = make_solver(solver, problem)
+        self._solver = CheckedSolver(solver, problem)
         self._gains = gains
         self._dt = dt
         self._momentum_control = momentum_control
@@ -132,13 +127,25 @@ class VelocityController:
         self._targets = np.zeros(self._rows)
         self._previous = np.zeros(n)
         self._momentum_integral = np.zeros(3)
-        self.report = _IDLE
+        self.report = IDLE
 
     def reset(self) -> None:
         """Forget the previous command and the momentum integral."""
         self._previous[:] = 0.0
         self._momentum_integral[:] = 0.0
-        self.report = _IDLE
+        self.report = IDLE
+
+    def command(
+        self,
+        estimator: FeetFixedEstimator,
+        joint_position: Array,
+        joint_velocity: Array,
+        reference: ComReference,
+    ) -> JointCommand:
+        """One control tick, as :class:`icub_jump_env.control.jump.LaunchController`."""
+        return JointCommand(
+            self.update(estimator, joint_position, reference.position, reference.velocity)
+        )
 
     def update(
         self,
@@ -159,13 +166,7 @@ class VelocityController:
             (23,) joint velocities (rad/s) within the limits.
         """
         self._pose(estimator, joint_position, com_position, com_velocity)
-        solution = self._solver.solve()
-        residuals = check_solution(self.problem, solution)
-        status = solution.status
-        if status is QPStatus.SOLVED and not _acceptable(residuals, self._solver.tolerances):
-            status = QPStatus.REJECTED
-        self.report = QPReport(status, residuals, solution.iterations)
-
+        solution, self.report = self._solver.solve()
         # Keeping on is the best guess when the solver has none. The limits take the
         # last rounding error off a solution; fmin and fmax pass over NaN limits.
         n, command = self.problem.n, self._previous
@@ -208,15 +209,3 @@ class VelocityController:
             np.subtract(limit, rate, out=bound)  # (3e), positions by forward Euler
             np.minimum(bound, self._speed, out=bound)
             np.maximum(bound, self._slowest, out=bound)
-
-
-_IDLE = QPReport(QPStatus.SOLVED, QPResiduals(0.0, 0.0, 0.0), 0)
-
-
-def _acceptable(residuals: QPResiduals, tolerances: QPTolerances) -> bool:
-    # Written so that NaN residuals are not acceptable.
-    return (
-        residuals.primal <= tolerances.primal
-        and residuals.dual <= tolerances.dual
-        and residuals.gap <= tolerances.gap
-    )

@@ -35,7 +35,7 @@ class EvalOptions:
         episodes: Episodes of each arm.
         seed: Seed of the first episode; the next ones count up.
         json: Write everything to this file.
-        plot: Draw the figures 1, 2 and 6 into this folder.
+        plot: Draw the figures 1, 2 (torque controller: 3) and 6 into this folder.
         video: Record the jump to this file, such as jump.mp4 (extra 'video').
     """
 
@@ -111,9 +111,11 @@ def _evaluate(options: EvalOptions) -> None:
         trace=options.plot is not None,
         console=progress,
     )
-    rows = comparison_rows(arms[0].episodes, arms[1].episodes)
+    controller = options.config.controller
+    rows = comparison_rows(controller, arms[0].episodes, arms[1].episodes)
     title = (
-        f"{options.config.jump_height * 100:g} cm jump; the paper's: 4 cm after 11 cm of launch"
+        f"{options.config.jump_height * 100:g} cm jump, {controller} controller; "
+        "the paper's: 4 cm after 11 cm"
     )
     console.print(render_table(rows, title, momentum_control))
     console.print(verdict(rows, momentum_control))

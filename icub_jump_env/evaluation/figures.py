@@ -1,15 +1,17 @@
-"""The paper's figures 1, 2 and 6, redrawn from our simulation."""
+"""The paper's figures 1, 2 or 3, and 6, redrawn from our simulation."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
 from icub_jump_env.robot import facts
@@ -33,10 +35,11 @@ def draw_figures(folder: Path, config: JumpConfig, episodes: Mapping[str, Episod
     """
     folder.mkdir(parents=True, exist_ok=True)
     ours = episodes["with" if config.momentum_control else "without"]
+    figure_number = _LAUNCH[config.controller].figure.lower().replace(". ", "")
     files = []
     for name, figure in (
         ("fig1_com_reference", com_reference_figure(config)),
-        ("fig2_launch", launch_figure(config, ours.trace)),
+        (f"{figure_number}_launch", launch_figure(config, ours.trace)),
         ("fig6_base_pitch", base_pitch_figure(episodes)),
     ):
         file = folder / f"{name}.png"
@@ -62,41 +65,59 @@ def com_reference_figure(config: JumpConfig) -> Figure:
     return figure
 
 
+class _Shown(NamedTuple):
+    """What the launch figure of a controller shows of the joints."""
+
+    figure: str
+    quantity: str
+    command: str
+    unit: str
+    limit: NDArray[np.float64]
+
+
+_LAUNCH: dict[ControllerName, _Shown] = {
+    "velocity": _Shown(
+        "Fig. 2", "joint_velocity", "joint_velocity_command", "rad/s", facts.VELOCITY_LIMIT
+    ),
+    "torque": _Shown("Fig. 3", "joint_torque", "joint_torque_command", "Nm", facts.EFFORT_LIMIT),
+}
+
+
 def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
-    """Fig. 2: joint velocities and CoM height, desired and measured."""
+    """Fig. 2 (joint velocities) or Fig. 3 (joint torques) and CoM height, desired and measured."""
+    shown = _LAUNCH[config.controller]
     duration = _trajectory(config).duration
     time = np.array([s.time for s in trace])
     figure, axes = _figure(1, 4, (13.0, 3.4))
     launch = time <= duration
     for axis, joint in zip(axes, ("ankle_pitch", "knee", "hip_pitch"), strict=False):
         index = facts.JOINT_INDEX[f"l_{joint}"]
-        measured = np.array([s.joint_velocity[index] for s in trace])
+        measured = np.array([getattr(s, shown.quantity)[index] for s in trace])
         # A snapshot holds the command that led to it, issued one control period before.
-        desired = np.array([s.joint_velocity_command[index] for s in trace[1:]])
+        desired = np.array([getattr(s, shown.command)[index] for s in trace[1:]])
         axis.plot(time[launch], measured[launch], color=MEASURED, label="measured")
         axis.plot(
             time[:-1][launch[1:]], desired[launch[1:]], color=DESIRED, ls="--", label="desired"
         )
-        limit = facts.VELOCITY_LIMIT[index]
-        peak = float(np.abs(measured[launch]).max())
-        if peak > 0.8 * limit:
+        limit = shown.limit[index]
+        if float(np.abs(measured[launch]).max()) > 0.8 * limit:
             sign = np.sign(measured[launch][-1])
             axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":", label="limit")
-        _label(axis, f"left {joint.replace('_', ' ')}", "rad/s")
+        _label(axis, f"left {joint.replace('_', ' ')}", shown.unit)
     axes[0].legend(frameon=False)
 
     height = axes[3]
     end = duration + 0.6
-    shown = time <= end
+    early = time <= end
     com = np.array([s.com[2] for s in trace])
     reference = np.array([s.com_reference[2] for s in trace])
-    height.plot(time[shown], com[shown], color=MEASURED)
-    height.plot(time[shown], reference[shown], color=DESIRED, ls="--")
+    height.plot(time[early], com[early], color=MEASURED)
+    height.plot(time[early], reference[early], color=DESIRED, ls="--")
     height.axvline(duration, color=ACCENT, lw=0.8, ls=":")
     height.annotate("T", (duration, com.min()), color=ACCENT, ha="left")
     _label(height, "CoM height", "m")
     figure.suptitle(
-        f"Fig. 2: {config.controller} approach, take-off commanded at {duration:.2f} s"
+        f"{shown.figure}: {config.controller} approach, take-off commanded at {duration:.2f} s"
     )
     return figure
 

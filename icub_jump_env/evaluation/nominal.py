@@ -81,6 +81,7 @@ def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
             for arm in arms
         },
         "comparison": [
-            dataclasses.asdict(row) for row in comparison_rows(ours.episodes, other.episodes)
+            dataclasses.asdict(row)
+            for row in comparison_rows(ours.config.controller, ours.episodes, other.episodes)
         ],
     }

@@ -1,8 +1,10 @@
-"""What the paper reports of its velocity controller (section IV)."""
+"""What the paper reports of its controllers (section IV)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from icub_jump_env.config import ControllerName
 
 
 @dataclass(frozen=True)
@@ -15,14 +17,18 @@ class PaperResult:
         takeoff_velocity: Commanded take-off velocity (section IV).
         takeoff_time: Take-off time (section IV, Fig. 2).
         ballistic_height: CoM rise computed from the take-off speed measured on the
-            real robot (section IV-B).
+            real robot (section IV-B), which jumped with the velocity controller only.
     """
 
-    flight_height: float = 0.035
-    sole_height: float = 0.037
+    flight_height: float
+    sole_height: float
+    ballistic_height: float | None
     takeoff_velocity: float = 0.89
     takeoff_time: float = 0.43
-    ballistic_height: float = 0.03
+    landed: float = 1.0
 
 
-PAPER = PaperResult()
+PAPER: dict[ControllerName, PaperResult] = {
+    "velocity": PaperResult(0.035, 0.037, ballistic_height=0.03),
+    "torque": PaperResult(0.016, 0.023, ballistic_height=None),
+}

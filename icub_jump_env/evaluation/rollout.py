@@ -43,7 +43,7 @@ def make_env(config: JumpConfig) -> ICubJumpEnv:
 
 def traced(config: JumpConfig) -> JumpConfig:
     """The same jump, stepped once per control tick; with a zero action nothing else changes."""
-    return dataclasses.replace(config, agent_frequency=config.control_frequency)
+    return dataclasses.replace(config, agent_frequency=config.control_rate)
 
 
 def run_episode(

@@ -10,6 +10,7 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
+from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.paper import PAPER
 from icub_jump_env.evaluation.rollout import Episode
 
@@ -39,22 +40,26 @@ class Row:
 
 _CM, _DEG = 100.0, math.degrees(1.0)
 
-_QUANTITIES: tuple[tuple[str, str, str, float, float | None, str], ...] = (
-    ("flight height (CoM)", "flight_height", "cm", _CM, PAPER.flight_height, "simulation"),
-    ("sole height", "sole_height", "cm", _CM, PAPER.sole_height, "simulation"),
-    ("take-off velocity", "takeoff_velocity", "m/s", 1.0, PAPER.takeoff_velocity, "command"),
-    ("take-off time", "takeoff_time", "s", 1.0, PAPER.takeoff_time, "command"),
-    ("ballistic height", "ballistic_height", "cm", _CM, PAPER.ballistic_height, "real robot"),
-    ("rotation in flight", "flight_rotation", "deg", _DEG, None, ""),
-    ("base pitch in flight", "base_pitch_range", "deg", _DEG, None, "Fig. 6"),
-    ("landed and stands", "landed", "%", 100.0, 1.0, "simulation"),
+_QUANTITIES = (
+    ("flight height (CoM)", "flight_height", "cm", _CM, "simulation"),
+    ("sole height", "sole_height", "cm", _CM, "simulation"),
+    ("take-off velocity", "takeoff_velocity", "m/s", 1.0, "command"),
+    ("take-off time", "takeoff_time", "s", 1.0, "command"),
+    ("ballistic height", "ballistic_height", "cm", _CM, "real robot"),
+    ("rotation in flight", "flight_rotation", "deg", _DEG, ""),
+    ("base pitch in flight", "base_pitch_range", "deg", _DEG, "Fig. 6"),
+    ("landed and stands", "landed", "%", 100.0, "simulation"),
 )
+"""Quantity, metric and attribute of the paper's result, unit, scale, the paper's source."""
 
 
-def comparison_rows(ours: Sequence[Episode], switched: Sequence[Episode]) -> list[Row]:
+def comparison_rows(
+    controller: ControllerName, ours: Sequence[Episode], switched: Sequence[Episode]
+) -> list[Row]:
     """The rows of the table.
 
     Args:
+        controller: Whose results in the paper to compare with.
         ours: Episodes as configured.
         switched: Episodes with the momentum constraint switched over.
 
@@ -62,7 +67,8 @@ def comparison_rows(ours: Sequence[Episode], switched: Sequence[Episode]) -> lis
         One row per quantity: medians, and a mean for the share that landed.
     """
     rows = []
-    for quantity, key, unit, scale, paper, source in _QUANTITIES:
+    for quantity, key, unit, scale, source in _QUANTITIES:
+        paper = getattr(PAPER[controller], key, None)
         reduce = np.mean if key == "landed" else np.median
         value, other = (
             scale * float(reduce([float(episode.jump[key]) for episode in episodes]))

@@ -61,15 +61,19 @@ class FeetFixedKinematics:
             to the left one. Both feet are at rest (eq. 3c) where it vanishes.
         base_rotation: (3, 3) orientation of ``root_link`` in the world.
         base_position: (3,) position of ``root_link`` in the world (m).
+        base_p_com: (3,) CoM position in the base frame (m).
+        J_left: (6, 6) twist of the left foot of the left leg's joints, base frame.
+        J_right: (6, 6) the same of the right foot.
+        model: The Pinocchio model, shared; do not change it.
         world_M_ankle: ``pinocchio.SE3`` of the left ankle roll joint, which stands still.
     """
 
     def __init__(self, ankle_shift: bool = True) -> None:
         self._ankle_shift = ankle_shift
-        self._model = _cached_model(ankle_shift)
-        self._data = self._model.createData()
-        self._q = pin.neutral(self._model)
-        self.mass = float(pin.computeTotalMass(self._model))
+        self.model = _cached_model(ankle_shift)
+        self.data = self.model.createData()
+        self._q = pin.neutral(self.model)
+        self.mass = float(pin.computeTotalMass(self.model))
         self._inverse_mass = 1.0 / self.mass
         self.com = np.zeros(3)
         self.centroidal_map = np.zeros((6, facts.N_JOINTS))
@@ -82,10 +86,10 @@ class FeetFixedKinematics:
         self._world_R_ankle = self.world_M_ankle.rotation.copy()
         self._world_p_ankle = self.world_M_ankle.translation.copy()
         # Views of Pinocchio's buffers: reading an attribute costs more than using it.
-        data = self._data
+        data = self.data
         self._A_base, self._A_joints = data.Ag[:, :6], data.Ag[:, 6:]
-        self._J_left, self._J_right = data.J[:, 6:12], data.J[:, 12:18]
-        self._base_p_com = data.com[0]
+        self.J_left, self.J_right = data.J[:, 6:12], data.J[:, 12:18]
+        self.base_p_com = data.com[0]
         placement = data.oMi[ankle]
         self._ankle_R_base, self._base_p_ankle = placement.rotation.T, placement.translation
         self._joint_map = np.zeros((6, facts.N_JOINTS))
@@ -100,7 +104,7 @@ class FeetFixedKinematics:
 
         The sole is welded to the last joint of the leg, so that joint stands still too.
         """
-        model, data = self._model, self._data
+        model, data = self.model, self.data
         pin.framesForwardKinematics(model, data, self._q)
         left, right = (model.getFrameId(name) for name in facts.SOLE_FRAMES)
         stance_width = abs(data.oMf[left].actInv(data.oMf[right]).translation[1])
@@ -118,17 +122,17 @@ class FeetFixedKinematics:
         # With the base at the origin, its columns of J are the identity, so that the
         # base twist for a left foot at rest is minus the left leg's contribution.
         self._q[7:] = joint_position
-        pin.computeCentroidalMap(self._model, self._data, self._q)
-        self.J_feet[:, facts.LEFT_LEG] = self._J_left
-        np.negative(self._J_right, out=self.J_feet[:, facts.RIGHT_LEG])
+        pin.computeCentroidalMap(self.model, self.data, self._q)
+        self.J_feet[:, facts.LEFT_LEG] = self.J_left
+        np.negative(self.J_right, out=self.J_feet[:, facts.RIGHT_LEG])
 
         R = np.dot(self._world_R_ankle, self._ankle_R_base, out=self.base_rotation)
         np.subtract(self._world_p_ankle, R.dot(self._base_p_ankle), out=self.base_position)
-        np.add(R.dot(self._base_p_com), self.base_position, out=self.com)
+        np.add(R.dot(self.base_p_com), self.base_position, out=self.com)
 
         joint_map = self._joint_map
         joint_map[:] = self._A_joints
-        self._joint_map_left -= self._A_base.dot(self._J_left)
+        self._joint_map_left -= self._A_base.dot(self.J_left)
         np.dot(R, joint_map[:3], out=self.J_com)
         np.dot(R, joint_map[3:], out=self.J_momentum)
         self.J_com *= self._inverse_mass

@@ -44,12 +44,13 @@ class JointServo:
 
     In velocity control the servo integrates the command itself, which makes it a PI
     velocity servo. Its position error is kept within what the effort limit can
-    use, so that it does not wind up. Above the speed limit it gives less and less
+    use, so that it does not wind up. In torque control it passes the torque on. Above the speed limit it gives less and less
     torque in the direction of motion, and none at 1.03 times the limit. Runs at each
     physics step.
 
     Attributes:
         velocity_command: (23,) latest commanded joint velocities (rad/s).
+        torque_command: (23,) latest commanded torques (Nm); NaN unless in torque control.
     """
 
     def __init__(self, dt: float, gains: ServoGains | None = None) -> None:
@@ -71,14 +72,20 @@ class JointServo:
         self._reference = np.zeros(facts.N_JOINTS)
         self.velocity_command = np.zeros(facts.N_JOINTS)
         self._torque = np.zeros(facts.N_JOINTS)
+        self.torque_command = np.full(facts.N_JOINTS, np.nan)
+        self._torque_control = False
 
     def reset(self, joint_position: Array, torque: Array) -> None:
         """Hold ``joint_position`` ((23,) rad) with ``torque`` ((23,) Nm)."""
         self._reference[:] = joint_position + torque / self._stiffness
         self.velocity_command[:] = 0.0
+        self.torque_command[:] = np.nan
+        self._torque_control = False
 
     def command(self, command: JointCommand) -> None:
         """Take a new command."""
+        self._torque_control = command.torque is not None
+        self.torque_command[:] = np.nan if command.torque is None else command.torque
         self.velocity_command[:] = command.velocity
         if command.position is not None:
             self._reference[:] = command.position
@@ -94,16 +101,22 @@ class JointServo:
             (23,) joint torques (Nm) within the effort limits; a buffer that the next
             call overwrites.
         """
-        reference = self._reference
-        reference += self.velocity_command * self._dt
-        error = reference - joint_position
-        np.clip(error, -self._largest_error, self._largest_error, out=error)
-        np.add(error, joint_position, out=reference)
         torque = self._torque
-        np.multiply(error, self._stiffness, out=torque)
-        torque += self._damping * (self.velocity_command - joint_velocity)
+        if self._torque_control:
+            torque[:] = self.torque_command
+        else:
+            self._track(joint_position, joint_velocity, torque)
         braking = self._droop * joint_velocity
         np.minimum(torque, self._droop_torque - braking, out=torque)
         np.maximum(torque, -self._droop_torque - braking, out=torque)
         np.minimum(torque, self._effort, out=torque)
         return np.maximum(torque, -self._effort, out=torque)
+
+    def _track(self, joint_position: Array, joint_velocity: Array, torque: Array) -> None:
+        reference = self._reference
+        reference += self.velocity_command * self._dt
+        error = reference - joint_position
+        np.clip(error, -self._largest_error, self._largest_error, out=error)
+        np.add(error, joint_position, out=reference)
+        np.multiply(error, self._stiffness, out=torque)
+        torque += self._damping * (self.velocity_command - joint_velocity)

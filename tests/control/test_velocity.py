@@ -205,6 +205,12 @@ def test_per_joint_weights_favour_joints():
     assert uses[1] < uses[0]
 
 
+def script(subject, *answers):
+    """Put words into the mouth of the controller's solver."""
+    checked = subject._solver
+    checked._solver = Scripted(checked._solver, answers)
+
+
 class Scripted:
     """A solver that says what the test wants."""
 
@@ -244,7 +250,7 @@ def gone(solution):
 def test_a_failed_solve_keeps_the_previous_command(failure, status):
     estimator, s = measured(0)
     subject = controller()
-    subject._solver = Scripted(subject._solver, [honest, failure, honest])
+    script(subject, honest, failure, honest)
     velocity = np.array([0.0, 0.0, 0.2])
     first, second, third = (
         subject.update(estimator, s, estimator.com, velocity * k) for k in (1, 2, 3)
@@ -258,7 +264,7 @@ def test_a_failed_solve_keeps_the_previous_command(failure, status):
 def test_a_failed_solve_is_reported(failure):
     estimator, s = measured(0)
     subject = controller()
-    subject._solver = Scripted(subject._solver, [failure])
+    script(subject, failure)
     command = subject.update(estimator, s, estimator.com, np.zeros(3))
     assert subject.report.failed
     assert not command.any()

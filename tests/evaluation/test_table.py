@@ -18,7 +18,7 @@ def episode(**jump):
 
 
 def rows(ours, without):
-    return {row.quantity: row for row in comparison_rows(ours, without)}
+    return {row.quantity: row for row in comparison_rows("velocity", ours, without)}
 
 
 def test_medians_units_and_differences():
@@ -32,6 +32,13 @@ def test_medians_units_and_differences():
     assert rotation.difference is None
     assert rotation.switched == pytest.approx(-10.0)
     assert table["landed and stands"].switched == 0.0
+
+
+def test_the_torque_controller_is_compared_with_the_papers_torque_controller():
+    table = {r.quantity: r for r in comparison_rows("torque", [episode()], [episode()])}
+    assert table["flight height (CoM)"].paper == pytest.approx(1.6)
+    assert table["sole height"].paper == pytest.approx(2.3)
+    assert table["ballistic height"].paper is None  # the real robot did not jump with it
 
 
 def test_landing_is_a_share():
@@ -48,7 +55,7 @@ def test_landing_is_a_share():
 )
 def test_verdict(ours, without, words):
     arms = [[episode(landed=landed) for landed in arm] for arm in (ours, without)]
-    sentence = verdict(comparison_rows(*arms), momentum_control=True)
-    assert verdict(comparison_rows(*arms[::-1]), momentum_control=False) == sentence
+    sentence = verdict(comparison_rows("velocity", *arms), momentum_control=True)
+    assert verdict(comparison_rows("velocity", *arms[::-1]), momentum_control=False) == sentence
     for word in words:
         assert word in sentence
