@@ -13,6 +13,7 @@ then momentum and CoM; never a limit, a contact constraint or the feet.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,11 +129,13 @@ class TorqueController:
         self._holding_torque = holding_torque
         self._previous = holding_torque.copy()
         self._Lambda = np.array(gains.posture_weight)
-        self._Delta = np.array(gains.continuity_weight)
-        self._sqrt_Delta = np.sqrt(self._Delta)[:, None]
+        self._sqrt_Delta = np.sqrt(np.array(gains.continuity_weight))[:, None]
+        self._com_scale = math.sqrt(gains.com_weight) / dynamics.mass
+        self._momentum_scale = math.sqrt(gains.momentum_weight)
         self._diagonal = np.concatenate((self._Lambda, np.full(12, gains.wrench_weight)))
-        self._tasks = np.zeros((6 if momentum_control else 3, 12))
-        self._targets = np.zeros(len(self._tasks))
+        # Rows and residual at x = 0 of the least squares: continuity, CoM, momentum.
+        self._rows = np.zeros((_N + (6 if momentum_control else 3), problem.n))
+        self._residual = np.zeros(len(self._rows))
         self._set_constant_rows(cone, contact.minimum_force)
         self.solution = np.zeros(problem.n)
         self.report = IDLE
@@ -201,32 +204,33 @@ class TorqueController:
     ) -> None:
         gains, problem, dynamics = self._gains, self.problem, self._dynamics
         kinematics = estimator.kinematics
-        world_to_base = kinematics.base_rotation.T
-        acceleration = (
-            reference.acceleration
-            - gains.com_stiffness * (estimator.com - reference.position)
-            - gains.com_damping * (estimator.com_velocity - reference.velocity)
-        )
-        tasks, targets = self._tasks, self._targets
-        scale = gains.com_weight**0.5
-        np.multiply(dynamics.force_rows, scale / kinematics.mass, out=tasks[:3])  # (6b)
-        targets[:3] = scale * world_to_base.dot(acceleration - GRAVITY)
+        world_R_base = kinematics.base_rotation
+        rows, residual = self._rows, self._residual
+        # Continuity (6a): tau - tau_{k-1}, with tau = T x + t.
+        np.multiply(self._sqrt_Delta, dynamics.torque_rows, out=rows[:_N])
+        np.subtract(dynamics.torque_bias, self._previous, out=residual[:_N])
+        residual[:_N] *= self._sqrt_Delta[:, 0]
+        # CoM (6b): the contact forces and gravity give the wanted acceleration.
+        wanted = reference.acceleration - GRAVITY
+        wanted -= gains.com_stiffness * (estimator.com - reference.position)
+        wanted -= gains.com_damping * (estimator.com_velocity - reference.velocity)
+        np.multiply(dynamics.force_rows, self._com_scale, out=rows[_N : _N + 3, _N:])
+        np.dot(wanted, world_R_base, out=residual[_N : _N + 3])
+        residual[_N : _N + 3] *= -self._com_scale * kinematics.mass
         if self._momentum_control:
-            scale = gains.momentum_weight**0.5
-            np.multiply(dynamics.moment_rows, scale, out=tasks[3:])  # (6d)
-            targets[3:] = world_to_base.dot(estimator.angular_momentum)
-            targets[3:] *= -scale * gains.momentum
+            # Momentum (6d): the contact moments about the CoM are -K H_omega.
+            scale = self._momentum_scale
+            np.multiply(dynamics.moment_rows, scale, out=rows[_N + 3 :, _N:])
+            np.dot(estimator.angular_momentum, world_R_base, out=residual[_N + 3 :])
+            residual[_N + 3 :] *= scale * gains.momentum
 
-        # Posture and continuity (6a), the latter through tau = T x + t.
-        weighted = self._sqrt_Delta * dynamics.torque_rows
-        np.matmul(weighted.T, weighted, out=problem.H)
-        problem.H[_N:, _N:] += tasks.T.dot(tasks)
+        np.matmul(rows.T, rows, out=problem.H)
         problem.H.reshape(-1)[:: problem.n + 1] += self._diagonal
-        step = self._Delta * (dynamics.torque_bias - self._previous)
-        np.dot(step, dynamics.torque_rows, out=problem.g)
-        problem.g[_N:] -= targets.dot(tasks)
-        wanted = gains.posture_stiffness * (self._posture - s) - gains.posture_damping * s_dot
-        problem.g[:_N] -= self._Lambda * wanted
+        np.dot(residual, rows, out=problem.g)
+        posture = gains.posture_stiffness * (self._posture - s)
+        posture -= gains.posture_damping * s_dot
+        posture *= self._Lambda
+        problem.g[:_N] -= posture
 
     def _pose_constraints(self, estimator: FeetFixedEstimator, s: Array, s_dot: Array) -> None:
         gains, problem, dynamics = self._gains, self.problem, self._dynamics

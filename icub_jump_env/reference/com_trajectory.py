@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from icub_jump_env.errors import CommandNotScalableError
 
@@ -85,8 +85,7 @@ ACCELERATION_CURVE = NormalizedCurve(order=5, end_slope=-3.68)
 displacement is then 2.75 times the jump height, 11 cm at 4 cm."""
 
 
-@dataclass(frozen=True)
-class ComSample:
+class ComSample(NamedTuple):
     """Vertical CoM reference at one instant: rise above the start (m), m/s, m/s^2."""
 
     position: float

@@ -11,6 +11,7 @@ of the equations of motion (eq. 1), where f = (f_left, f_right) are the contact 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,27 @@ Array = NDArray[np.float64]
 GRAVITY = np.array([0.0, 0.0, -9.81])
 """World gravity (m/s^2)."""
 
-_LEGS = slice(0, 12)
+
+@dataclass
+class _Foot:
+    """Views of what belongs to one foot.
+
+    Attributes:
+        placement: Last leg joint in the base frame, as the kinematics left it.
+        drift: Its acceleration at nu_dot = 0, minus gravity.
+        sole: (6, 6) moves a wrench from the sole frame to that joint.
+        J: (6, 6) twist of the foot of its leg's joints.
+        base_rows, torque_rows: Where the foot's wrench enters the rows.
+        wrench: (6, 6) moves a wrench from the sole frame to the base.
+    """
+
+    placement: Any
+    drift: Any
+    sole: Array
+    J: Array
+    base_rows: Array
+    torque_rows: Array
+    wrench: Array = field(default_factory=lambda: np.zeros((6, 6)))
 
 
 class FeetFixedDynamics:
@@ -35,6 +56,7 @@ class FeetFixedDynamics:
     next update overwrites.
 
     Attributes:
+        mass: Total mass (kg).
         base_rows: (6, 35) of (s_ddot, f).
         base_bias: (6,) b; the base rows of eq. 1 are ``base_rows @ x = base_bias``.
         torque_rows: (23, 35) of (s_ddot, f).
@@ -47,9 +69,11 @@ class FeetFixedDynamics:
 
     def __init__(self, kinematics: FeetFixedKinematics) -> None:
         self._kinematics = kinematics
-        self._model = kinematics.model.copy()
-        self._data: Any = self._model.createData()
+        model = kinematics.model.copy()
+        data = model.createData()
+        self._model, self._data = model, data
         n = facts.N_JOINTS
+        self.mass = kinematics.mass
         self.base_rows = np.zeros((6, n + 12))
         self.base_bias = np.zeros(6)
         self.torque_rows = np.zeros((n, n + 12))
@@ -57,12 +81,29 @@ class FeetFixedDynamics:
         self.foot_bias = np.zeros(6)
         self.force_rows = np.zeros((3, 12))
         self.moment_rows = np.zeros((3, 12))
-        self._damping = np.array(self._model.damping[6:])
-        self._q = pin.neutral(self._model)
-        self._v = np.zeros(self._model.nv)
-        self._soles = [
-            self._model.frames[self._model.getFrameId(name)] for name in facts.SOLE_FRAMES
-        ]
+
+        self._damping = np.array(model.damping[6:])
+        self._q = pin.neutral(model)
+        self._v = np.zeros(model.nv)
+        self._gravity = np.zeros(6)
+        # Views of Pinocchio's buffers: reading an attribute costs more than using it.
+        self._h_base, self._h_joints = data.nle[:6], data.nle[6:]
+        self._M_base, self._M_coupling = data.M[:6, :6], data.M[:6, 6:]
+        self._M_joints = data.M[6:, 6:]
+        self._feet = [self._foot(side, frame) for side, frame in enumerate(facts.SOLE_FRAMES)]
+
+    def _foot(self, side: int, frame_name: str) -> _Foot:
+        frame = self._model.frames[self._model.getFrameId(frame_name)]
+        first = facts.N_JOINTS + 6 * side
+        columns, leg = slice(first, first + 6), (facts.LEFT_LEG, facts.RIGHT_LEG)[side]
+        return _Foot(
+            placement=self._kinematics.data.oMi[frame.parentJoint],
+            drift=self._data.a_gf[frame.parentJoint],
+            sole=frame.placement.toDualActionMatrix(),
+            J=(self._kinematics.J_left, self._kinematics.J_right)[side],
+            base_rows=self.base_rows[:, columns],
+            torque_rows=self.torque_rows[leg, columns],
+        )
 
     def __reduce__(self) -> tuple[type[FeetFixedDynamics], tuple[FeetFixedKinematics]]:
         # The buffers are filled anew by the next update.
@@ -75,40 +116,35 @@ class FeetFixedDynamics:
             joint_position: (23,) rad; the kinematics must be updated for it already.
             joint_velocity: (23,) rad/s.
         """
-        model, data, kinematics = self._model, self._data, self._kinematics
-        J_left, J_right = kinematics.J_left, kinematics.J_right
+        model, kinematics = self._model, self._kinematics
+        J_left = kinematics.J_left
         # An inertial frame that coincides with the base at this instant.
-        gravity = kinematics.base_rotation.T.dot(GRAVITY)
-        model.gravity.linear = gravity
+        gravity = self._gravity
+        np.dot(GRAVITY, kinematics.base_rotation, out=gravity[:3])
+        model.gravity.linear = gravity[:3]
         self._q[7:] = joint_position
-        self._v[:6] = -J_left.dot(joint_velocity[facts.LEFT_LEG])
+        np.dot(J_left, joint_velocity[facts.LEFT_LEG], out=self._v[:6])
+        np.negative(self._v[:6], out=self._v[:6])
         self._v[6:] = joint_velocity
-        h = pin.nonLinearEffects(model, data, self._q, self._v)
-        M = pin.crba(model, data, self._q)
+        pin.nonLinearEffects(model, self._data, self._q, self._v)
+        pin.crba(model, self._data, self._q)
 
-        drifts, n = [], facts.N_JOINTS
-        for foot, frame in enumerate(self._soles):
-            placement = kinematics.data.oMi[frame.parentJoint]
-            drift = placement.act(data.a_gf[frame.parentJoint]).vector
-            drift[:3] += gravity
-            drifts.append(drift)
-            wrench = placement.act(frame.placement).toDualActionMatrix()
-            columns = slice(n + 6 * foot, n + 6 * foot + 6)
-            self.base_rows[:, columns] = -wrench
-            leg, J = ((facts.LEFT_LEG, J_left), (facts.RIGHT_LEG, J_right))[foot]
-            self.torque_rows[leg, columns] = -J.T.dot(wrench)
+        drifts = []
+        for foot in self._feet:
+            # Pinocchio's a_gf is the acceleration at nu_dot = 0, minus gravity.
+            drifts.append(foot.placement.act(foot.drift).vector + gravity)
+            np.dot(foot.placement.toDualActionMatrix(), foot.sole, out=foot.wrench)
+            np.negative(foot.wrench, out=foot.base_rows)
+            np.negative(foot.J.T.dot(foot.wrench), out=foot.torque_rows)
         np.subtract(drifts[1], drifts[0], out=self.foot_bias)
 
-        M_base, M_coupling = M[:6, :6], M[:6, 6:]
-        self.base_rows[:, :n] = M_coupling
-        self.base_rows[:, facts.LEFT_LEG] -= M_base.dot(J_left)
-        np.subtract(M_base.dot(drifts[0]), h[:6], out=self.base_bias)
-        # crba fills the upper triangle only.
-        joint_rows = self.torque_rows[:, :n]
-        upper = M[6:, 6:]
-        np.add(np.triu(upper), np.triu(upper, 1).T, out=joint_rows)
-        joint_rows[:, facts.LEFT_LEG] -= M_coupling.T.dot(J_left)
-        np.subtract(h[6:], M_coupling.T.dot(drifts[0]), out=self.torque_bias)
+        n, coupling = facts.N_JOINTS, self._M_coupling
+        self.base_rows[:, :n] = coupling
+        self.base_rows[:, facts.LEFT_LEG] -= self._M_base.dot(J_left)
+        np.subtract(self._M_base.dot(drifts[0]), self._h_base, out=self.base_bias)
+        self.torque_rows[:, :n] = self._M_joints
+        self.torque_rows[:, facts.LEFT_LEG] -= coupling.T.dot(J_left)
+        np.subtract(self._h_joints, drifts[0].dot(coupling), out=self.torque_bias)
         self.torque_bias += self._damping * joint_velocity
 
         np.negative(self.base_rows[:3, n:], out=self.force_rows)
