@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections import defaultdict
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -39,70 +42,72 @@ def samples_of(controller: ControllerName, count: int) -> list[Sample]:
     return [launch[i % len(launch)] for i in range(count)]
 
 
-def median_us(call: Callable[[Sample], object], samples: list[Sample]) -> float:
-    """Median duration of ``call`` over the samples (us)."""
-    durations = []
-    for sample in samples:
+class Stopwatch:
+    """Durations (us) of named parts, over many runs."""
+
+    def __init__(self) -> None:
+        self._durations: dict[str, list[float]] = defaultdict(list)
+
+    def time(self, part: str, call: Callable[[], object]) -> Any:
+        """Run ``call`` and note its duration; return what it returns."""
         start = time.perf_counter_ns()
-        call(sample)
-        durations.append(time.perf_counter_ns() - start)
-    return float(np.median(durations)) / 1e3
+        result = call()
+        self._durations[part].append((time.perf_counter_ns() - start) / 1e3)
+        return result
+
+    def medians(self) -> dict[str, float]:
+        """Median duration of each part."""
+        return {part: float(np.median(values)) for part, values in self._durations.items()}
 
 
 def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
-    """Print the split of one control tick."""
+    """Print the control tick and its parts, timed in turn at the same states."""
     model = build_pinocchio_model()
     limits = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
     kinematics = FeetFixedKinematics()
-    estimator = FeetFixedEstimator(kinematics)
+    estimator, reference = FeetFixedEstimator(kinematics), ComReference()
     samples = samples_of(name, count)
     estimator.update(*samples[0][1:])
-    reference = ComReference()
     reference.reset(plan_com_trajectory(0.04), estimator.com)
-    split: dict[str, Callable[[Sample], object]] = {}
+    dynamics = FeetFixedDynamics(kinematics)
     controller: VelocityController | TorqueController
     if name == "torque":
-        dynamics = FeetFixedDynamics(kinematics)
         holding = np.zeros(facts.N_JOINTS)
         controller = TorqueController(facts.CROUCH, holding, limits, dynamics, solver=solver)
-        split["dynamics (Pinocchio)"] = lambda s: dynamics.update(s[1], s[2])
-        split["pose the QP"] = lambda s: (
-            controller._pose_cost(estimator, s[1], s[2], reference),
-            controller._pose_constraints(estimator, s[1], s[2]),
-        )
     else:
         controller = VelocityController(facts.CROUCH, limits, 0.005, solver=solver)
-        split["pose the QP"] = lambda s: controller._pose(
-            estimator, s[1], reference.position, reference.velocity
-        )
-
-    before, durations = [], []
-    for now, s, s_dot in samples:
-        start = time.perf_counter_ns()
-        estimator.update(s, s_dot)
-        reference.update(now)
-        estimated = time.perf_counter_ns()
-        controller.command(estimator, s, s_dot, reference)
-        durations.append((time.perf_counter_ns() - estimated) / 1e3)
-        before.append((estimated - start) / 1e3)
-
     problem = controller.problem
     alone = make_solver(solver, problem)
-    solution = alone.solve()
-    split[f"solve ({solver})"] = lambda _: alone.solve()
-    split["check the solution"] = lambda _: check_solution(problem, solution)
-    whole = float(np.median(durations))
+
+    watch = Stopwatch()
+    for now, s, s_dot in samples:
+        watch.time("estimate", partial(estimator.update, s, s_dot))
+        watch.time("CoM reference", partial(reference.update, now))
+        watch.time("tick", partial(controller.command, estimator, s, s_dot, reference))
+        if isinstance(controller, TorqueController):
+            watch.time("dynamics", partial(dynamics.update, s, s_dot))
+            watch.time("pose cost", partial(controller._pose_cost, estimator, s, s_dot, reference))
+            watch.time(
+                "pose constraints", partial(controller._pose_constraints, estimator, s, s_dot)
+            )
+        else:
+            watch.time(
+                "pose the QP",
+                partial(controller._pose, estimator, s, reference.position, reference.velocity),
+            )
+        solution = watch.time("solve", alone.solve)
+        watch.time("check the solution", partial(check_solution, problem, solution))
+
+    medians = watch.medians()
+    tick = medians.pop("tick")
     print(
-        f"{name} tick with {solver}, from estimated state to joint command: {whole:.1f} us, "
+        f"{name} tick with {solver}, from estimated state to joint command: {tick:.1f} us, "
         f"median of {count}"
     )
-    remainder = whole
-    for part, call in split.items():
-        duration = median_us(call, samples)
-        remainder -= duration
+    before = [f"{part} {medians.pop(part):.1f} us" for part in ("estimate", "CoM reference")]
+    for part, duration in medians.items():
         print(f"  {part:24s} {duration:7.1f} us")
-    print(f"  {'the rest':24s} {remainder:7.1f} us")
-    print(f"  before it: estimate and CoM reference {np.median(before):.1f} us")
+    print(f"  before it: {', '.join(before)}")
 
 
 def bench_episode(name: ControllerName, repetitions: int) -> None:
