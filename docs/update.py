@@ -15,11 +15,17 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 DOCS = Path(__file__).parent
 REPOSITORY = DOCS.parent
-BLOCK = re.compile(r"<!-- (python [^\n]*?) -->\n(```|\|)(.*?)(\n```|\n\n|\Z)", re.DOTALL)
+BLOCK = re.compile(
+    r"<!-- (?P<command>python [^\n]*?) -->\n"
+    r"(?:(?P<fence>```)\n.*?(?<=\n)```\n|(?:\|[^\n]*\n)+)",
+    re.DOTALL,
+)
+"""A command and, below it, a fenced block or a table."""
 
 
 def output_of(command: str) -> str:
@@ -33,15 +39,14 @@ def output_of(command: str) -> str:
     return "\n".join(lines).strip()
 
 
-def updated(text: str) -> str:
+def updated(text: str, output: Callable[[str], str] = output_of) -> str:
     """The document with fresh output in every block."""
 
     def fresh(match: re.Match[str]) -> str:
-        command, fence, _, end = match.groups()
-        print(command)
-        body = output_of(command)
-        start = "```\n" if fence == "```" else ""
-        return f"<!-- {command} -->\n{start}{body}{end}"
+        command, fence = match["command"], match["fence"] or ""
+        body = output(command)
+        block = f"{fence}\n{body}\n{fence}" if fence else body
+        return f"<!-- {command} -->\n{block}\n"
 
     return BLOCK.sub(fresh, text)
 
@@ -49,6 +54,7 @@ def updated(text: str) -> str:
 def main() -> None:
     """Update README.md and all documents."""
     for file in (REPOSITORY / "README.md", *sorted(DOCS.glob("*.md"))):
+        print(file.relative_to(REPOSITORY))
         file.write_text(updated(file.read_text()))
 
 

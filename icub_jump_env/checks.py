@@ -19,10 +19,11 @@ def check_choice(field: str, value: Any, allowed: tuple[Any, ...]) -> None:
         raise ConfigError(field, value, f"one of {', '.join(map(repr, allowed))}")
 
 
-def check_flag(field: str, value: Any) -> None:
-    """Refuse anything but a boolean."""
+def check_flag(field: str, value: Any) -> bool:
+    """Refuse anything but a boolean; return it as a bool."""
     if not isinstance(value, bool | np.bool_):
         raise ConfigError(field, value, "True or False")
+    return bool(value)
 
 
 def check_number(field: str, value: Any, low: float, high: float) -> float:
@@ -32,6 +33,13 @@ def check_number(field: str, value: Any, low: float, high: float) -> float:
     if not number or not low <= value <= high:
         raise ConfigError(field, value, f"a number from {low:g} to {high:g}")
     return float(value)
+
+
+def check_count(field: str, value: Any, low: int) -> int:
+    """Refuse anything but a whole number from ``low``; return it as an int."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < low:
+        raise ConfigError(field, value, f"a whole number from {low}")
+    return int(value)
 
 
 def check_numbers(
@@ -49,12 +57,7 @@ def check_numbers(
 
 def check_seed(seed: Any) -> int | None:
     """Refuse anything but a whole number from 0, or None."""
-    if seed is None:
-        return None
-    integer = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
-    if not integer or seed < 0:
-        raise ConfigError("seed", seed, "a whole number from 0, or None")
-    return int(seed)
+    return None if seed is None else check_count("seed", seed, 0)
 
 
 def check_action(action: Any) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ RenderMode = Literal["rgb_array", "human"]
 CONTROL_RATES: dict[ControllerName, float] = {"velocity": 200.0, "torque": 500.0}
 """Default rate (Hz) of each controller."""
 
-JUMP_HEIGHT_RANGE = (0.005, 0.15)
+JUMP_HEIGHT_RANGE = (0.01, 0.15)
 DISPLACEMENT_RANGE = (0.03, MAX_DISPLACEMENT)
 RESIDUAL_RANGE = (0.0, 0.10)
 TIMESTEP_RANGE = (1e-5, 2e-3)
@@ -83,8 +83,8 @@ class JumpConfig:
         check_choice("com_scaling", self.com_scaling, get_args(ComScaling))
         check_choice("solver", self.solver, get_args(SolverName))
         check_choice("render_mode", self.render_mode, (None, *get_args(RenderMode)))
-        check_flag("momentum_control", self.momentum_control)
-        check_flag("ankle_shift", self.ankle_shift)
+        for field in ("momentum_control", "ankle_shift"):
+            self._store(field, check_flag(field, getattr(self, field)))
         self._store(
             "jump_height", check_number("jump_height", self.jump_height, *JUMP_HEIGHT_RANGE)
         )
@@ -112,6 +112,10 @@ class JumpConfig:
             self._store("control_frequency", frequency)
         control = self.control_rate
         if not is_multiple(physics, control):
+            if self.control_frequency is None:
+                raise ConfigError(
+                    "timestep", self.timestep, f"a fraction of the control period, 1/{control:g} s"
+                )
             raise ConfigError(
                 "control_frequency", control, f"a divisor of the physics rate of {physics:g} Hz"
             )

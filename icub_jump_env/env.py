@@ -16,11 +16,11 @@ from icub_jump_env.checks import check_action, check_seed
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.jump import JumpController, LaunchController
 from icub_jump_env.control.phases import Phase
-from icub_jump_env.control.qp import QPReport
+from icub_jump_env.control.qp import IDLE, worse
 from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
-from icub_jump_env.metrics.jump import JointLimits, JumpRecorder
+from icub_jump_env.metrics.jump import AIRBORNE_FORCE, JointLimits, JumpRecorder
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot import facts
@@ -84,7 +84,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Every step: ``jump`` (dict of :class:`icub_jump_env.metrics.jump.JumpMetrics`, final
     at the end), ``is_success``, ``outcome``, ``phase``, ``time``, ``diverged``,
     ``jump_height``, ``solver_status``, ``solver_primal_residual``,
-    ``solver_dual_residual``, ``solver_gap`` and, from ``step``, the reward terms.
+    ``solver_dual_residual``, ``solver_gap`` (of the step's worst control tick) and, from ``step``, the reward terms.
 
     ## Arguments
     The fields of :class:`icub_jump_env.config.JumpConfig`. ``reset(options=
@@ -134,7 +134,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._start_com = np.zeros(3)
         self._episode = cfg
         self._outcome = "not reset"
-        self._report: QPReport | None = None
+        self._report = IDLE
         self._observation = np.zeros(observation.SIZE, np.float32)
         self._renderer: Renderer | None = None
         if self.render_mode is not None:
@@ -183,7 +183,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._controller.reset(trajectory, self._start_com)
         self._recorder.reset()
         self._outcome = "running"
-        self._report = None
+        self._report = IDLE
         self._observe()
         if self.render_mode == "human":
             self.render()
@@ -208,6 +208,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         action64 = check_action(action)
         target = action64 * self._residual_scale
+        self._report = IDLE
         already_over = self._outcome != "running"
         for _ in range(self.config.controls_per_step):
             if self._outcome == "running":
@@ -282,9 +283,9 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             float(sensors.foot_force.sum()),
             residual_target,
         )
-        self._report = tick.report
-        if tick.report is not None and tick.report.failed:
-            self._recorder.metrics.solver_failures += 1.0
+        if tick.report is not None:
+            self._report = worse(self._report, tick.report)
+            self._recorder.metrics.solver_failures += float(tick.report.failed)
         self._servo.command(tick.command)
         for _ in range(self.config.physics_per_control):
             physics.step(self._servo.torque(physics.joint_position, physics.joint_velocity))
@@ -309,8 +310,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             return "fell"
         if self._recorder.stood:
             return "stood"
+        airborne = truth.ground_force < AIRBORNE_FORCE
         deadline = self._controller.trajectory.duration + TAKEOFF_GRACE
-        if truth.time >= deadline and math.isnan(self._recorder.metrics.takeoff_time):
+        if (
+            truth.time >= deadline
+            and not airborne
+            and math.isnan(self._recorder.metrics.takeoff_time)
+        ):
             return "no take-off"
         return "running"
 
@@ -330,20 +336,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return np.concatenate((kinematics.base_position, quaternion, self._crouch))
 
     def _make_launch(self, limits: JointLimits) -> LaunchController:
-        cfg = self.config
+        cfg, crouch = self.config, self._crouch
         positions = limits.lower_position, limits.upper_position
+        options = cfg.momentum_control, cfg.solver
         if cfg.controller == "torque":
-            return TorqueController(
-                self._crouch,
-                self._crouch_torque,
-                positions,
-                FeetFixedDynamics(self._estimator.kinematics),
-                cfg.momentum_control,
-                cfg.solver,
-            )
-        return VelocityController(
-            self._crouch, positions, cfg.control_dt, cfg.momentum_control, cfg.solver
-        )
+            dynamics = FeetFixedDynamics(self._estimator.kinematics)
+            return TorqueController(crouch, self._crouch_torque, positions, dynamics, *options)
+        return VelocityController(crouch, positions, cfg.control_dt, *options)
 
     def _joint_limits(self) -> JointLimits:
         lower, upper = self._physics.model.jnt_range[1:].T
@@ -382,7 +381,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _info(self) -> dict[str, Any]:
         metrics, report = self._recorder.metrics, self._report
-        residuals = report.residuals if report else None
         return {
             "jump": metrics.as_dict(),
             "is_success": metrics.is_success(self._episode.jump_height),
@@ -391,8 +389,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "phase": self._controller.phases.phase.name.lower(),
             "time": float(self._physics.data.time),
             "jump_height": self._episode.jump_height,
-            "solver_status": str(report.status) if report else "idle",
-            "solver_primal_residual": residuals.primal if residuals else 0.0,
-            "solver_dual_residual": residuals.dual if residuals else 0.0,
-            "solver_gap": residuals.gap if residuals else 0.0,
+            "solver_status": str(report.status),
+            "solver_primal_residual": report.residuals.primal,
+            "solver_dual_residual": report.residuals.dual,
+            "solver_gap": report.residuals.gap,
         }

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 import icub_jump_env
 from icub_jump_env import observation
+from icub_jump_env.control.qp import QPStatus
 from icub_jump_env.errors import ActionError, ConfigError, ICubJumpError
 
 ZERO = np.zeros(3, dtype=np.float32)
@@ -144,7 +145,6 @@ def test_observations_are_finite_and_inside_the_space(env):
 
 def test_observations_are_sensibly_scaled(env):
     observations, _, _ = rollout(env)
-    assert (np.abs(observations).max(axis=0) <= observation.OBSERVATION_LIMIT).all()
     moving = observations.std(axis=0) > 1e-6
     assert moving.sum() > 50
     assert np.median(np.abs(observations[:, moving]).max(axis=0)) > 0.02
@@ -168,6 +168,66 @@ def test_observation_values(env):
     assert obs[slices["com_displacement"]] == pytest.approx(1.1)
     assert np.abs(obs[slices["joint_position"]]).max() < 0.01
     assert obs[slices["foot_force"]].sum() * 300 == pytest.approx(324.3, rel=1e-2)
+
+
+def decoded(obs):
+    """Blocks of an observation in SI units."""
+    return {
+        block.name: obs[observation.SLICES[block.name]].astype(float) * block.scale
+        for block in observation.BLOCKS
+    }
+
+
+def test_observation_against_the_simulator_in_mid_launch():
+    """Every block against an independent source: MuJoCo's state, the clock, the snapshot."""
+    env = gymnasium.make("ICubJump-v0", jump_height=0.05).unwrapped
+    env.reset(seed=0)
+    start = env.snapshot().com
+    for _ in range(30):
+        obs, *_ = env.step(np.array([0.1, -0.1, 0.1], np.float32))
+    block, data, now = decoded(obs), env.data, env.snapshot()
+    crouch = env._crouch
+    assert block["time"] == pytest.approx(0.30)
+    duration = block["takeoff_time"]
+    assert duration == pytest.approx(0.11 / (0.28867 * math.sqrt(2 * 9.81 * 0.05)), rel=1e-3)
+    assert block["launch_progress"] == pytest.approx(0.30 / duration)
+    np.testing.assert_allclose(block["joint_position"], data.qpos[7:] - crouch, atol=1e-6)
+    np.testing.assert_allclose(block["joint_velocity"], data.qvel[6:], atol=1e-5)
+    imu = data.site("imu").xmat.reshape(3, 3)
+    np.testing.assert_allclose(block["gravity"], imu.T @ [0, 0, -1], atol=1e-6)
+    world_gyro = data.body("root_link").xmat.reshape(3, 3) @ data.qvel[3:6]
+    np.testing.assert_allclose(imu @ block["gyro"], world_gyro, atol=5e-3)
+    assert np.abs(world_gyro[1]) > 0.1
+    # The feet have hardly moved, so that the estimates are close to the truth.
+    np.testing.assert_allclose(block["com_offset"], now.com - start, atol=2e-3)
+    np.testing.assert_allclose(block["com_velocity"], now.com_velocity, atol=0.03)
+    H = data.sensor("angular_momentum").data
+    np.testing.assert_allclose(block["angular_momentum"], H, atol=0.05)
+    np.testing.assert_allclose(
+        block["com_error"], block["com_offset"] + env._start_com - now.com_reference, atol=1e-5
+    )
+    assert block["residual_offset"] == pytest.approx([0.006, -0.002, 0.002], rel=0.1)
+    assert np.abs(block["residual_velocity"]).max() < 0.01
+    feet = [data.sensor(f"{side}_sole_force").data[3] for side in "lr"]
+    np.testing.assert_allclose(block["foot_force"], feet, rtol=1e-5)
+    assert feet[0] != pytest.approx(feet[1], rel=1e-3)  # the lateral residual loads one foot
+    env.close()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_each_axis_of_the_action_moves_the_com_its_way(axis, sign):
+    action, coms = np.zeros(3, np.float32), []
+    action[axis] = 0.4 * sign
+    for residual in (ZERO, action):
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env.reset(seed=0)
+        for _ in range(30):
+            env.step(residual)
+        coms.append(env.snapshot().com)
+        env.close()
+    shift = sign * (coms[1] - coms[0])[axis]
+    assert 0.5 * 0.4 * env.config.residual_scale[axis] < shift
 
 
 def test_no_privileged_state_in_the_observation():
@@ -333,6 +393,32 @@ class TestEpisodeEnd:
         assert stood == pytest.approx(0.3, abs=0.011)
         assert info["is_success"]
 
+    def test_a_touch_of_anything_but_the_soles_is_a_fall(self):
+        """A shin box that has grown to the length of the leg touches at once."""
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env.reset(seed=0)
+        shin = env.model.geom("l_lower_leg_contact").id
+        env.model.geom_size[shin] = 0.25
+        env.model.geom_rbound[shin] = 0.5
+        env.model.geom_aabb[shin, 3:] = 0.25
+        *_, terminated, _, info = env.step(ZERO)
+        assert terminated
+        assert info["outcome"] == "fell"
+        assert env._truth.state.chest_tilt < math.radians(40)
+
+    def test_a_tilt_of_more_than_60_degrees_is_a_fall(self):
+        """Without contact: the robot turns in the air."""
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env.reset(seed=0)
+        env.data.qpos[2] += 3.0
+        env.data.qvel[4] = -6.0
+        terminated = False
+        while not terminated:
+            *_, terminated, _, info = env.step(ZERO)
+        assert info["outcome"] == "fell"
+        assert env._truth.state.only_feet_touch
+        assert math.degrees(env._truth.state.chest_tilt) == pytest.approx(60.0, abs=1.5)
+
     def test_fall_ends_it(self):
         *_, info = rollout(gymnasium.make("ICubJump-v0", momentum_control=False))
         assert info["outcome"] == "fell"
@@ -385,6 +471,33 @@ class TestEpisodeEnd:
         assert info["jump_height"] == 0.02
         _, info = env.reset(seed=0)
         assert info["jump_height"] == 0.04
+
+
+def test_solver_failures_are_counted_and_shown():
+    """Every other tick fails: the step's info shows the failure, not the success after it."""
+    env = gymnasium.make("ICubJump-v0").unwrapped
+    checked = env._controller._launch._solver
+    solve, ticks = checked.solve, iter(range(1000))
+
+    def flaky():
+        solution, report = solve()
+        status = QPStatus.REJECTED if next(ticks) % 2 == 0 else report.status
+        return solution, report._replace(status=status)
+
+    checked.solve = flaky
+    env.reset(seed=0)
+    for step in range(10):
+        *_, info = env.step(ZERO)
+        assert info["jump"]["solver_failures"] == step + 1
+        assert info["solver_status"] == "rejected"
+        assert 0 < info["solver_dual_residual"] < 1e-8
+    env.close()
+
+
+def test_residual_cost_charges_for_the_action(env):
+    env.reset(seed=0)
+    *_, info = env.step(np.array([0.5, -0.5, 1.0], np.float32))
+    assert info["reward_residual"] == pytest.approx(-0.001 * 1.5)
 
 
 class TestDivergence:

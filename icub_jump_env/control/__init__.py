@@ -1,1 +1,1 @@
-"""Controllers: QP, velocity controller (eq. 3), minimum jerk, phases of the jump."""
+"""Controllers: QP, velocity (eq. 3) and torque controller (eq. 6), minimum jerk, phases of the jump."""

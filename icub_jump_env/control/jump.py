@@ -70,12 +70,10 @@ class Tick(NamedTuple):
     """Outcome of one control tick.
 
     Attributes:
-        phase: Phase the command belongs to.
         command: Command to the joint servos.
         report: How the QP went; ``None`` in phases without one.
     """
 
-    phase: Phase
     command: JointCommand
     report: QPReport | None
 
@@ -149,7 +147,7 @@ class JumpController:
             command = self._launch.command(
                 estimator, joint_position, joint_velocity, self.reference
             )
-            return Tick(phase, command, self._launch.report)
+            return Tick(command, self._launch.report)
 
         if self._flight is None:
             goal = landing_posture(self._crouch, self.trajectory.displacement)
@@ -157,4 +155,4 @@ class JumpController:
             self._flight_start = time
         # An early touch-down does not stop the motion, so that chatter cannot either.
         position, velocity = self._flight.sample(time - self._flight_start)
-        return Tick(phase, JointCommand(velocity, position), None)
+        return Tick(JointCommand(velocity, position), None)

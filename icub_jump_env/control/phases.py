@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from icub_jump_env.checks import check_number
+from icub_jump_env.checks import check_count, check_number
 
 
 class Phase(IntEnum):
@@ -39,7 +39,7 @@ class ContactThresholds:
         check_number("lift_off", self.lift_off, 0.0, 1e4)
         # Below the lift-off force, a robot about to take off would count as landed.
         check_number("touch_down", self.touch_down, self.lift_off, 1e4)
-        check_number("lift_off_ticks", self.lift_off_ticks, 1, 1000)
+        check_count("lift_off_ticks", self.lift_off_ticks, 1)
 
 
 class PhaseMachine:

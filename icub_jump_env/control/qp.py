@@ -46,6 +46,8 @@ class QuadraticProgram:
 class QPStatus(StrEnum):
     """What the solver claims and what the check outside of it found."""
 
+    IDLE = "idle"
+    """No QP was posed."""
     SOLVED = "solved"
     INFEASIBLE = "infeasible"
     SOLVER_ERROR = "solver error"
@@ -115,10 +117,15 @@ class QPReport(NamedTuple):
     @property
     def failed(self) -> bool:
         """Whether the solution was not applied."""
-        return self.status is not QPStatus.SOLVED
+        return self.status not in (QPStatus.SOLVED, QPStatus.IDLE)
 
 
-IDLE = QPReport(QPStatus.SOLVED, QPResiduals(0.0, 0.0, 0.0), 0)
+def worse(first: QPReport, second: QPReport) -> QPReport:
+    """The report that tells of a failure, else the one with the larger residuals."""
+    return max(second, first, key=lambda report: (report.failed, max(report.residuals)))
+
+
+IDLE = QPReport(QPStatus.IDLE, QPResiduals(0.0, 0.0, 0.0), 0)
 """Report before the first tick."""
 
 

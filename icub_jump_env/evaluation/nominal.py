@@ -44,7 +44,8 @@ def run_nominal(
     Returns:
         The arm as configured and the other one.
     """
-    with Progress(console=console, transient=True) as progress:
+    hidden = not console.is_terminal
+    with Progress(console=console, transient=True, disable=hidden) as progress:
         task = progress.add_task("jumping", total=2 * episodes)
         arms = []
         for momentum_control in (config.momentum_control, not config.momentum_control):
@@ -82,6 +83,6 @@ def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
         },
         "comparison": [
             dataclasses.asdict(row)
-            for row in comparison_rows(ours.config.controller, ours.episodes, other.episodes)
+            for row in comparison_rows(ours.config, ours.episodes, other.episodes)
         ],
     }

@@ -10,9 +10,10 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from icub_jump_env.config import ControllerName
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.paper import PAPER
 from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
 
 
 @dataclass(frozen=True)
@@ -48,18 +49,20 @@ _QUANTITIES = (
     ("ballistic height", "ballistic_height", "cm", _CM, "real robot"),
     ("rotation in flight", "flight_rotation", "deg", _DEG, ""),
     ("base pitch in flight", "base_pitch_range", "deg", _DEG, "Fig. 6"),
+    ("limit violations", "limit_violations", "steps", 1.0, ""),
     ("landed and stands", "landed", "%", 100.0, "simulation"),
 )
 """Quantity, metric and attribute of the paper's result, unit, scale, the paper's source."""
 
 
 def comparison_rows(
-    controller: ControllerName, ours: Sequence[Episode], switched: Sequence[Episode]
+    config: JumpConfig, ours: Sequence[Episode], switched: Sequence[Episode]
 ) -> list[Row]:
     """The rows of the table.
 
     Args:
-        controller: Whose results in the paper to compare with.
+        config: Our configuration. There is a difference to the paper only where it is the
+            paper's jump.
         ours: Episodes as configured.
         switched: Episodes with the momentum constraint switched over.
 
@@ -68,16 +71,22 @@ def comparison_rows(
     """
     rows = []
     for quantity, key, unit, scale, source in _QUANTITIES:
-        paper = getattr(PAPER[controller], key, None)
+        paper = getattr(PAPER[config.controller], key, None)
         reduce = np.mean if key == "landed" else np.median
         value, other = (
             scale * float(reduce([float(episode.jump[key]) for episode in episodes]))
             for episodes in (ours, switched)
         )
         reference = None if paper is None else scale * paper
-        difference = None if reference is None else value - reference
+        same_jump = plan(config) == plan(JumpConfig())
+        difference = None if reference is None or not same_jump else value - reference
         rows.append(Row(quantity, unit, reference, value, difference, other, source))
     return rows
+
+
+def plan(config: JumpConfig) -> ComTrajectory:
+    """The CoM trajectory of a configuration."""
+    return plan_com_trajectory(config.jump_height, config.com_displacement, config.com_scaling)
 
 
 def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Table:

@@ -64,7 +64,8 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
     )
     env = make_env(config)
     frames = []
-    with Progress(console=console, transient=True) as progress:
+    hidden = not console.is_terminal
+    with Progress(console=console, transient=True, disable=hidden) as progress:
         task = progress.add_task("recording", total=None)
 
         def shoot(env: ICubJumpEnv) -> None:

@@ -10,16 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.metrics.state import TrueState
+from icub_jump_env.robot.facts import GRAVITY, SPEED_TOLERANCE
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.81
 AIRBORNE_FORCE = 1.0
 """The robot is airborne while the ground carries less than this (N)."""
 LANDED_TILT = math.radians(30.0)
 """A landed robot keeps its chest within this tilt (rad)."""
-SPEED_TOLERANCE = 1.03
-"""A joint violates its speed limit above this multiple of it."""
 POSITION_TOLERANCE = 1e-3
 """... and its position limit beyond this (rad): MuJoCo's limits are slightly soft."""
 CHATTER_TIME = 0.02
@@ -144,7 +142,7 @@ class JumpRecorder:
             stand_time: Time (s) to stand after touch-down.
         """
         self._limits = limits
-        self._speed = limits.speed * SPEED_TOLERANCE
+        self._speed = limits.speed * (1 + SPEED_TOLERANCE)
         self._lower = limits.lower_position - POSITION_TOLERANCE
         self._upper = limits.upper_position + POSITION_TOLERANCE
         self._torque = limits.torque * (1 + 1e-9)

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from icub_jump_env.errors import CommandNotScalableError
-
-GRAVITY = 9.81
-"""Standard gravity of the paper and of the simulation (m/s^2)."""
+from icub_jump_env.robot.facts import GRAVITY
 
 ComScaling = Literal["displacement", "acceleration"]
 
@@ -25,7 +23,7 @@ MAX_DISPLACEMENT = 0.15
 """Largest displacement (m): from the crouch at 0.39 m, 0.15 m is 97 % of a straight leg."""
 
 MAX_ACCELERATION = 25.0
-"""Largest upward acceleration (m/s^2) of a reference. The leg torques hold about 15."""
+"""Largest upward acceleration (m/s^2) of a reference; far more than the legs can give."""
 
 
 @dataclass(frozen=True)

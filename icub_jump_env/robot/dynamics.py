@@ -23,8 +23,8 @@ from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float64]
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
-"""World gravity (m/s^2)."""
+GRAVITY = np.array([0.0, 0.0, -facts.GRAVITY])
+"""Acceleration of gravity, world (m/s^2)."""
 
 
 @dataclass

@@ -19,6 +19,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+GRAVITY = 9.81
+"""Standard gravity of the paper and of the simulation (m/s^2)."""
+
 URDF_MODEL = "iCubGenova04"
 """The model of the icub-models package: the paper's robot, iCub v2.5."""
 
@@ -112,6 +115,9 @@ def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
     values.setflags(write=False)
     return values
 
+
+SPEED_TOLERANCE = 0.03
+"""Share of the speed limit by which a joint may exceed it: the servos fade out over it."""
 
 EFFORT_LIMIT = _frozen(np.array([motor.effort for motor in MOTORS]))
 """(23,) Nm."""

@@ -31,7 +31,7 @@ class ServoGains:
 
     stiffness: float = 1500.0
     damping: float = 50.0
-    speed_band: float = 0.03
+    speed_band: float = facts.SPEED_TOLERANCE
 
     def __post_init__(self) -> None:
         check_number("stiffness", self.stiffness, 1e-3, 1e6)

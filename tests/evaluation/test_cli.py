@@ -133,7 +133,7 @@ def test_flags_reach_the_configuration():
     [
         (["--wings", "2"], ["--wings"]),
         (["--jump-height", "high"], ["--jump-height", "'high'"]),
-        (["--jump-height", "7"], ["jump_height", "7", "0.005 to 0.15"]),
+        (["--jump-height", "7"], ["jump_height", "7", "0.01 to 0.15"]),
         (["--controller", "psychic"], ["--controller", "psychic", "velocity"]),
         (["--residual-scale", "1"], ["--residual-scale", "3"]),
         (["--timestep", "nan"], ["timestep", "nan"]),
@@ -211,4 +211,4 @@ def test_eval_py_runs_from_anywhere(tmp_path):
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert result.returncode == 2
-    assert result.stderr == "error: jump_height=9.0 is not allowed: a number from 0.005 to 0.15\n"
+    assert result.stderr == "error: jump_height=9.0 is not allowed: a number from 0.01 to 0.15\n"

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.table import comparison_rows, verdict
 
@@ -12,13 +13,13 @@ def episode(**jump):
     values = {
         "flight_height": 0.04, "sole_height": 0.05, "takeoff_velocity": 0.9,
         "takeoff_time": 0.43, "ballistic_height": 0.041, "flight_rotation": math.radians(0.5),
-        "base_pitch_range": math.radians(4.0), "landed": True,
+        "base_pitch_range": math.radians(4.0), "landed": True, "limit_violations": 0.0,
     }  # fmt: skip
     return Episode(0, "stood", True, values | jump)
 
 
 def rows(ours, without):
-    return {row.quantity: row for row in comparison_rows("velocity", ours, without)}
+    return {row.quantity: row for row in comparison_rows(JumpConfig(), ours, without)}
 
 
 def test_medians_units_and_differences():
@@ -27,6 +28,7 @@ def test_medians_units_and_differences():
     height = table["flight height (CoM)"]
     assert (height.paper, height.ours) == pytest.approx((3.5, 3.6))
     assert height.difference == pytest.approx(0.1)
+    assert table["base pitch in flight"].ours == pytest.approx(4.0)
     rotation = table["rotation in flight"]
     assert rotation.paper is None
     assert rotation.difference is None
@@ -35,10 +37,18 @@ def test_medians_units_and_differences():
 
 
 def test_the_torque_controller_is_compared_with_the_papers_torque_controller():
-    table = {r.quantity: r for r in comparison_rows("torque", [episode()], [episode()])}
+    table = {
+        r.quantity: r
+        for r in comparison_rows(JumpConfig(controller="torque"), [episode()], [episode()])
+    }
     assert table["flight height (CoM)"].paper == pytest.approx(1.6)
     assert table["sole height"].paper == pytest.approx(2.3)
     assert table["ballistic height"].paper is None  # the real robot did not jump with it
+
+
+def test_no_difference_to_another_jump_than_the_papers():
+    higher = JumpConfig(jump_height=0.05)
+    assert all(r.difference is None for r in comparison_rows(higher, [episode()], [episode()]))
 
 
 def test_landing_is_a_share():
@@ -55,7 +65,7 @@ def test_landing_is_a_share():
 )
 def test_verdict(ours, without, words):
     arms = [[episode(landed=landed) for landed in arm] for arm in (ours, without)]
-    sentence = verdict(comparison_rows("velocity", *arms), momentum_control=True)
-    assert verdict(comparison_rows("velocity", *arms[::-1]), momentum_control=False) == sentence
+    sentence = verdict(comparison_rows(JumpConfig(), *arms), momentum_control=True)
+    assert verdict(comparison_rows(JumpConfig(), *arms[::-1]), momentum_control=False) == sentence
     for word in words:
         assert word in sentence

@@ -10,10 +10,10 @@ from icub_jump_env.errors import CommandNotScalableError
 from icub_jump_env.reference.com_trajectory import (
     ACCELERATION_CURVE,
     DISPLACEMENT_CURVE,
-    GRAVITY,
     plan_com_trajectory,
     takeoff_velocity,
 )
+from icub_jump_env.robot.facts import GRAVITY
 
 CURVES = [DISPLACEMENT_CURVE, ACCELERATION_CURVE]
 
