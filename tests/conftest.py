@@ -6,6 +6,7 @@ import os
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
+import gymnasium
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -26,6 +27,34 @@ def rng() -> np.random.Generator:
 def in_temporary_folder(tmp_path, monkeypatch):
     """MuJoCo writes MUJOCO_LOG.TXT into the working folder when a simulation diverges."""
     monkeypatch.chdir(tmp_path)
+
+
+ZERO = np.zeros(3, dtype=np.float32)
+
+
+@pytest.fixture
+def env():
+    env = gymnasium.make("ICubJump-v0", stand_time=0.3)
+    yield env
+    env.close()
+
+
+def rollout(env, actions=None, seed=0, options=None):
+    """All observations, rewards and the last info of an episode."""
+    rng = np.random.default_rng(seed)
+    obs, _ = env.reset(seed=seed, options=options)
+    observations, rewards, terminated = [obs], [], False
+    while not terminated:
+        action = ZERO if actions is None else actions(rng)
+        obs, reward, terminated, truncated, info = env.step(action)
+        assert not truncated
+        observations.append(obs)
+        rewards.append(reward)
+    return np.array(observations), np.array(rewards), info
+
+
+def random_action(rng):
+    return rng.uniform(-1, 1, 3).astype(np.float32)
 
 
 def jump(**config) -> Episode:

@@ -7,7 +7,13 @@ from pathlib import Path
 import pytest
 
 from icub_jump_env import observation
+from icub_jump_env.control.contact import ContactLimits
+from icub_jump_env.control.jump import FLIGHT_MOTION_TIME
+from icub_jump_env.control.phases import ContactThresholds
+from icub_jump_env.control.torque import TorqueGains
+from icub_jump_env.control.velocity import VelocityGains
 from icub_jump_env.evaluation import cli
+from icub_jump_env.simulation.actuators import ServoGains
 
 REPOSITORY = Path(__file__).parents[1]
 DOCUMENTS = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
@@ -46,3 +52,29 @@ def test_every_command_of_eval_parses(document):
         arguments = line.split(" -->")[0].split()
         if arguments != ["--help"]:
             cli.parse(cli.EvalOptions, arguments)
+
+
+def test_the_controller_page_states_the_gains_in_use():
+    page = (REPOSITORY / "docs" / "controller.md").read_text()
+    velocity, torque, servo = VelocityGains(), TorqueGains(), ServoGains()
+    contact, thresholds = ContactLimits(), ContactThresholds()
+    for statement in (
+        f"weight {velocity.com_weight:.0e}".replace("e+0", "e"),
+        f"weight {velocity.momentum_weight:.0e}".replace("e+0", "e"),
+        f"both {velocity.com:g} 1/s",
+        f"speed limits x {velocity.velocity_margin:g}",
+        f"look {velocity.limit_horizon * 1e3:g} ms ahead",
+        f"weight {torque.com_weight:.0e}".replace("e+0", "e"),
+        f"weight {torque.momentum_weight:.0e}".replace("e+0", "e"),
+        f"hold after {torque.speed_horizon * 1e3:g} ms",
+        f"position limits after {torque.limit_horizon * 1e3:g} ms",
+        f"friction pyramid {contact.friction:g}",
+        f"torsion {contact.torsional_friction:g} m",
+        f"at least {contact.minimum_force:g} N",
+        f"({servo.stiffness:g} Nm/rad, {servo.damping:g} Nm s/rad)",
+        f"less than {thresholds.lift_off:g} N",
+        f"({thresholds.touch_down:g} N)",
+        f"motion of {FLIGHT_MOTION_TIME:g} s",
+    ):
+        assert statement in page, statement
+    assert velocity.com == velocity.momentum

@@ -12,6 +12,7 @@ import gymnasium
 import numpy as np
 import psutil
 import pytest
+from conftest import ZERO, random_action, rollout
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,34 +20,6 @@ from hypothesis import strategies as st
 import icub_jump_env
 from icub_jump_env import observation
 from icub_jump_env.control.qp import QPStatus
-from icub_jump_env.errors import ActionError, ConfigError, ICubJumpError
-
-ZERO = np.zeros(3, dtype=np.float32)
-
-
-@pytest.fixture
-def env():
-    env = gymnasium.make("ICubJump-v0", stand_time=0.3)
-    yield env
-    env.close()
-
-
-def rollout(env, actions=None, seed=0, options=None):
-    """All observations, rewards and the last info of an episode."""
-    rng = np.random.default_rng(seed)
-    obs, _ = env.reset(seed=seed, options=options)
-    observations, rewards, terminated = [obs], [], False
-    while not terminated:
-        action = ZERO if actions is None else actions(rng)
-        obs, reward, terminated, truncated, info = env.step(action)
-        assert not truncated
-        observations.append(obs)
-        rewards.append(reward)
-    return np.array(observations), np.array(rewards), info
-
-
-def random_action(rng):
-    return rng.uniform(-1, 1, 3).astype(np.float32)
 
 
 @pytest.mark.parametrize("name", ["ICubJump-v0", "icub_jump_env:ICubJump-v0"])
@@ -498,140 +471,6 @@ def test_residual_cost_charges_for_the_action(env):
     env.reset(seed=0)
     *_, info = env.step(np.array([0.5, -0.5, 1.0], np.float32))
     assert info["reward_residual"] == pytest.approx(-0.001 * 1.5)
-
-
-class TestDivergence:
-    @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e6, 1e11, 1e300])
-    @pytest.mark.parametrize("field", ["qpos", "qvel"])
-    def test_ends_the_episode_with_finite_observations(self, env, field, poison):
-        env.reset(seed=0)
-        for _ in range(5):
-            env.step(ZERO)
-        getattr(env.unwrapped.data, field)[12] = poison
-        obs, reward, terminated, truncated, info = env.step(ZERO)
-        assert terminated
-        assert not truncated
-        assert info["diverged"]
-        assert info["outcome"] == "diverged"
-        assert np.isfinite(obs).all()
-        assert math.isfinite(reward)
-        assert not info["is_success"]
-
-    def test_time_running_back_is_divergence(self, env):
-        """A reset behind our back leaves only finite numbers and no warning."""
-        import mujoco
-
-        env.reset(seed=0)
-        for _ in range(5):
-            env.step(ZERO)
-        mujoco.mj_resetData(env.unwrapped.model, env.unwrapped.data)
-        *_, terminated, _, info = env.step(ZERO)
-        assert terminated
-        assert info["diverged"]
-
-    def test_step_before_reset_is_refused(self):
-        env = gymnasium.make("ICubJump-v0").unwrapped
-        with pytest.raises(gymnasium.error.ResetNeeded):
-            env.step(ZERO)
-
-    def test_the_next_episode_is_clean(self, env):
-        clean = rollout(env)
-        env.reset(seed=0)
-        env.unwrapped.data.qvel[4] = np.nan
-        env.step(ZERO)
-        again = rollout(env)
-        np.testing.assert_array_equal(again[0], clean[0])
-
-
-class TestBadInput:
-    @pytest.mark.parametrize(
-        ("field", "value"),
-        [
-            ("controller", "psychic"), ("jump_height", -0.01), ("jump_height", 0.0),
-            ("jump_height", 1.0), ("jump_height", math.nan), ("jump_height", "high"),
-            ("jump_height", None), ("jump_height", True), ("com_displacement", 0.5),
-            ("com_displacement", -0.1), ("com_displacement", math.inf), ("com_scaling", "time"),
-            ("momentum_control", "yes"), ("momentum_control", 1), ("solver", "magic"),
-            ("solver", ["daqp"]), ("residual_scale", 0.1), ("residual_scale", (0.1, 0.1)),
-            ("residual_scale", (0.1, 0.1, -0.1)), ("residual_scale", (0.1, 0.1, math.nan)),
-            ("residual_scale", "abc"), ("timestep", 0.0), ("timestep", 0.1),
-            ("timestep", math.nan), ("control_frequency", 150.0), ("control_frequency", 0.0),
-            ("control_frequency", 3000.0), ("agent_frequency", 300.0), ("stand_time", -1.0),
-            ("stand_time", math.inf), ("ankle_shift", 15), ("render_mode", "ansi"),
-            ("wings", 2), ("jump_height", 10**400), ("residual_scale", {0.01, 0.02, 0.03}),
-        ],
-    )  # fmt: skip
-    @pytest.mark.filterwarnings("ignore:.*not in the possible render_modes")
-    def test_make_refuses_and_names_field_value_and_range(self, field, value):
-        with pytest.raises(ConfigError) as refusal:
-            gymnasium.make("ICubJump-v0", **{field: value})
-        assert refusal.value.field.startswith(field)
-        assert repr(value) in str(refusal.value)
-        assert refusal.value.allowed
-        assert isinstance(refusal.value, ICubJumpError)
-        assert isinstance(refusal.value, ValueError)
-
-    def test_numpy_values_are_welcome(self):
-        env = gymnasium.make(
-            "ICubJump-v0",
-            jump_height=np.float32(0.05),
-            residual_scale=np.full(3, 0.02),
-            momentum_control=np.True_,
-            solver=np.str_("daqp"),
-        )
-        env.reset(seed=np.int64(3))
-        assert env.unwrapped.config.jump_height == pytest.approx(0.05)
-        env.close()
-
-    @pytest.mark.parametrize(
-        "options",
-        [
-            {"jump_height": -1.0},
-            {"jump_height": math.nan},
-            {"height": 0.04},
-            {"timestep": 0.001},
-            3,
-        ],
-    )
-    def test_reset_refuses_and_stays_usable(self, env, options):
-        with pytest.raises(ConfigError):
-            env.unwrapped.reset(options=options)
-        env.reset(seed=0)
-        env.step(ZERO)
-
-    @pytest.mark.parametrize("seed", [-1, "a", 1.5, True])
-    def test_reset_refuses_bad_seeds(self, env, seed):
-        with pytest.raises(ConfigError, match="seed"):
-            env.unwrapped.reset(seed=seed)
-
-    def test_errors_can_be_raised_again_from_their_message(self):
-        """As Gymnasium's asynchronous vector environment does it."""
-        error = ActionError(str(ActionError("action", None, "three numbers")))
-        assert str(error) == "action=None is not allowed: three numbers"
-        assert str(pickle.loads(pickle.dumps(error))) == str(error)
-
-    @pytest.mark.parametrize(
-        "action",
-        [
-            np.full(3, np.nan), np.full(3, np.inf), np.full(3, 1.01), np.zeros(2),
-            np.zeros((3, 1)), ["0", "0", "0"], np.zeros(3, complex), np.zeros(3, bool), 0.0,
-            [0, 0, 10**400], None, "jump", [1, 2], ["a", "b", "c"], [[0, 0], [0]],
-        ],
-    )  # fmt: skip
-    def test_step_refuses_and_changes_nothing(self, env, action):
-        env.reset(seed=0)
-        env.step(ZERO)
-        before = env.unwrapped.data.qpos.copy()
-        with pytest.raises(ActionError) as refusal:
-            env.step(action)
-        assert refusal.value.field == "action"
-        np.testing.assert_array_equal(env.unwrapped.data.qpos, before)
-
-    def test_errors_survive_pickling(self):
-        for kind in (ActionError, ConfigError):
-            error = pickle.loads(pickle.dumps(kind("field", 3, "less")))
-            assert (error.field, error.value, error.allowed) == ("field", 3, "less")
-            assert str(error) == "field=3 is not allowed: less"
 
 
 @settings(max_examples=10)

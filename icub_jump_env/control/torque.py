@@ -163,28 +163,9 @@ class TorqueController:
         joint_velocity: Array,
         reference: ComReference,
     ) -> JointCommand:
-        """One control tick, as :class:`icub_jump_env.control.jump.LaunchController`."""
-        return JointCommand(
-            torque=self.update(estimator, joint_position, joint_velocity, reference)
-        )
+        """One control tick, as :class:`icub_jump_env.control.jump.LaunchController`.
 
-    def update(
-        self,
-        estimator: FeetFixedEstimator,
-        joint_position: Array,
-        joint_velocity: Array,
-        reference: ComReference,
-    ) -> Array:
-        """One control tick.
-
-        Args:
-            estimator: Estimates for the present encoder readings.
-            joint_position: (23,) measured s (rad).
-            joint_velocity: (23,) measured s_dot (rad/s).
-            reference: CoM reference.
-
-        Returns:
-            (23,) joint torques (Nm) within the limits.
+        The command carries (23,) joint torques (Nm) within the limits.
         """
         dynamics = self._dynamics
         dynamics.update(joint_position, joint_velocity)
@@ -197,7 +178,7 @@ class TorqueController:
             np.add(dynamics.torque_rows.dot(solution.x), dynamics.torque_bias, out=torque)
             np.minimum(torque, facts.EFFORT_LIMIT, out=torque)
             np.maximum(torque, -facts.EFFORT_LIMIT, out=torque)
-        return torque.copy()
+        return JointCommand(torque=torque.copy())
 
     def _pose_cost(
         self, estimator: FeetFixedEstimator, s: Array, s_dot: Array, reference: ComReference

@@ -60,7 +60,8 @@ class Case:
         self.reference.update(time)
 
     def tick(self):
-        return self.subject.update(self.estimator, self.s, self.s_dot, self.reference)
+        command = self.subject.command(self.estimator, self.s, self.s_dot, self.reference)
+        return command.torque
 
 
 def textbook(case, gains, contact, momentum_control):
