@@ -93,7 +93,7 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
         else:
             watch.time(
                 "pose the QP",
-                partial(controller._pose, estimator, s, reference.position, reference.velocity),
+                partial(controller._pose, estimator, s, reference),
             )
         solution = watch.time("solve", alone.solve)
         watch.time("check the solution", partial(check_solution, problem, solution))

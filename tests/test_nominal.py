@@ -89,7 +89,7 @@ def test_scaling_by_acceleration_jumps_and_lands():
     assert episode.jump["takeoff_time"] == pytest.approx(0.332, abs=0.01)
 
 
-@pytest.mark.parametrize("height", [0.02, 0.03, 0.05])
+@pytest.mark.parametrize("height", [0.01, 0.02, 0.03, 0.05])
 def test_other_commands_succeed(height):
     assert jump(jump_height=height, stand_time=0.5).is_success
 

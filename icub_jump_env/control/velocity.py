@@ -142,30 +142,11 @@ class VelocityController:
         joint_velocity: Array,
         reference: ComReference,
     ) -> JointCommand:
-        """One control tick, as :class:`icub_jump_env.control.jump.LaunchController`."""
-        return JointCommand(
-            self.update(estimator, joint_position, reference.position, reference.velocity)
-        )
+        """One control tick, as :class:`icub_jump_env.control.jump.LaunchController`.
 
-    def update(
-        self,
-        estimator: FeetFixedEstimator,
-        joint_position: Array,
-        com_position: Array,
-        com_velocity: Array,
-    ) -> Array:
-        """One control tick.
-
-        Args:
-            estimator: Estimates for ``joint_position`` and the present velocities.
-            joint_position: (23,) measured s (rad).
-            com_position: (3,) reference x_dc (m).
-            com_velocity: (3,) reference x_dot_dc (m/s).
-
-        Returns:
-            (23,) joint velocities (rad/s) within the limits.
+        The command carries (23,) joint velocities (rad/s) within the limits.
         """
-        self._pose(estimator, joint_position, com_position, com_velocity)
+        self._pose(estimator, joint_position, reference)
         solution, self.report = self._solver.solve()
         # Keeping on is the best guess when the solver has none. The limits take the
         # last rounding error off a solution; fmin and fmax pass over NaN limits.
@@ -174,19 +155,14 @@ class VelocityController:
             command[:] = solution.x
         np.fmin(command, self.problem.upper[:n], out=command)
         np.fmax(command, self.problem.lower[:n], out=command)
-        return command.copy()
+        return JointCommand(command.copy())
 
-    def _pose(
-        self,
-        estimator: FeetFixedEstimator,
-        s: Array,
-        com_position: Array,
-        com_velocity: Array,
-    ) -> None:
+    def _pose(self, estimator: FeetFixedEstimator, s: Array, reference: ComReference) -> None:
         gains, problem, kinematics = self._gains, self.problem, estimator.kinematics
         tasks, targets = self._tasks, self._targets
         np.multiply(kinematics.centroidal_map[: self._rows], self._task_scale, out=tasks)
-        targets[:3] = com_velocity - gains.com * (estimator.com - com_position)  # (3b)
+        error = estimator.com - reference.position
+        targets[:3] = reference.velocity - gains.com * error  # (3b)
         if self._momentum_control:
             self._momentum_integral += estimator.angular_momentum * self._dt
             targets[3:] = -gains.momentum * self._momentum_integral  # (3d)

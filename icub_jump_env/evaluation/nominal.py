@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.output import progress_display
 from icub_jump_env.evaluation.provenance import provenance
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
 from icub_jump_env.evaluation.table import comparison_rows
@@ -44,8 +44,7 @@ def run_nominal(
     Returns:
         The arm as configured and the other one.
     """
-    hidden = not console.is_terminal
-    with Progress(console=console, transient=True, disable=hidden) as progress:
+    with progress_display(console) as progress:
         task = progress.add_task("jumping", total=2 * episodes)
         arms = []
         for momentum_control in (config.momentum_control, not config.momentum_control):

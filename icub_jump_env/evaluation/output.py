@@ -9,7 +9,15 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+from rich.progress import Progress
+
 from icub_jump_env.errors import ConfigError
+
+
+def progress_display(console: Console) -> Progress:
+    """A progress display that vanishes when done, and says nothing to a file or pipe."""
+    return Progress(console=console, transient=True, disable=not console.is_terminal)
 
 
 def check_writable(field: str, path: Path, folder: bool = False) -> None:

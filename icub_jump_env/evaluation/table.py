@@ -70,6 +70,7 @@ def comparison_rows(
         One row per quantity: medians, and a mean for the share that landed.
     """
     rows = []
+    same_jump = _plan(config) == _plan(JumpConfig())
     for quantity, key, unit, scale, source in _QUANTITIES:
         paper = getattr(PAPER[config.controller], key, None)
         reduce = np.mean if key == "landed" else np.median
@@ -78,14 +79,12 @@ def comparison_rows(
             for episodes in (ours, switched)
         )
         reference = None if paper is None else scale * paper
-        same_jump = plan(config) == plan(JumpConfig())
         difference = None if reference is None or not same_jump else value - reference
         rows.append(Row(quantity, unit, reference, value, difference, other, source))
     return rows
 
 
-def plan(config: JumpConfig) -> ComTrajectory:
-    """The CoM trajectory of a configuration."""
+def _plan(config: JumpConfig) -> ComTrajectory:
     return plan_com_trajectory(config.jump_height, config.com_displacement, config.com_scaling)
 
 

@@ -6,11 +6,11 @@ import dataclasses
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import Progress
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.evaluation.output import progress_display
 from icub_jump_env.evaluation.rollout import make_env, run_episode
 from icub_jump_env.simulation.opengl import open_context
 
@@ -52,6 +52,7 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
         console: Where the progress is shown.
 
     Raises:
+        ConfigError: If the file's suffix is no video format.
         MissingDependencyError: If the extra or OpenGL is missing.
     """
     check_video(file)
@@ -64,8 +65,7 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
     )
     env = make_env(config)
     frames = []
-    hidden = not console.is_terminal
-    with Progress(console=console, transient=True, disable=hidden) as progress:
+    with progress_display(console) as progress:
         task = progress.add_task("recording", total=None)
 
         def shoot(env: ICubJumpEnv) -> None:

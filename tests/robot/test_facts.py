@@ -4,6 +4,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from icub_jump_env.robot import facts
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
@@ -125,6 +126,27 @@ def test_structure_for_users_of_the_mujoco_model(model):
 def test_posture_refuses_unknown_joints():
     with pytest.raises(KeyError):
         facts.posture(wing=3.0)
+
+
+def test_body_boxes_bound_the_meshes():
+    """The contact boxes of a fallen robot against the meshes they stand for."""
+    model = build_model(0.001, visuals=True)
+    for link, (center, half_size) in facts.BODY_BOXES.items():
+        body = model.body(link)
+        geoms = [
+            model.geom(i)
+            for i in range(body.geomadr[0], body.geomadr[0] + body.geomnum[0])
+            if model.geom(i).dataid[0] >= 0
+        ]
+        assert len(geoms) == 1
+        mesh = model.mesh(geoms[0].dataid[0])
+        first = mesh.vertadr[0]
+        vertices = model.mesh_vert[first : first + mesh.vertnum[0]]
+        rotation = Rotation.from_quat(geoms[0].quat, scalar_first=True)
+        vertices = rotation.apply(vertices) + geoms[0].pos
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        np.testing.assert_allclose(center, (low + high) / 2, atol=1e-3)
+        np.testing.assert_allclose(half_size, (high - low) / 2, atol=1e-3)
 
 
 def test_meshes_change_nothing_but_the_looks(model):
