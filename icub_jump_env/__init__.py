@@ -20,6 +20,16 @@ from icub_jump_env.errors import (
     InvalidValueError,
     MissingDependencyError,
 )
+from icub_jump_env.simulation.actuators.config import ActuatorConfig
+from icub_jump_env.simulation.actuators.motors import DCMotor, RatedMotor
+from icub_jump_env.simulation.actuators.servo import ServoGains
+from icub_jump_env.simulation.actuators.torque_loops import (
+    CurrentControl,
+    IdealTorque,
+    TorqueFeedback,
+)
+from icub_jump_env.simulation.randomization import Randomization
+from icub_jump_env.simulation.sensor_models import SensorConfig, SensorError
 
 __version__ = "0.1.0"
 
@@ -37,10 +47,20 @@ gymnasium.register(
 __all__ = [
     "ENV_ID",
     "ActionError",
+    "ActuatorConfig",
     "CommandNotScalableError",
     "ConfigError",
+    "CurrentControl",
+    "DCMotor",
     "ICubJumpError",
+    "IdealTorque",
     "InvalidValueError",
     "JumpConfig",
     "MissingDependencyError",
+    "Randomization",
+    "RatedMotor",
+    "SensorConfig",
+    "SensorError",
+    "ServoGains",
+    "TorqueFeedback",
 ]

@@ -55,6 +55,20 @@ def check_numbers(
         raise ConfigError(field, values, allowed) from None
 
 
+def check_range(field: str, values: Any, low: float, high: float) -> tuple[float, float]:
+    """Refuse anything but two numbers from ``low`` to ``high``, the lower one first."""
+    first, last = check_numbers(field, values, 2, low, high)
+    if first > last:
+        raise ConfigError(field, values, "the lower bound first")
+    return first, last
+
+
+def check_type(field: str, value: Any, *kinds: type) -> None:
+    """Refuse anything but an instance of one of the ``kinds``."""
+    if not isinstance(value, kinds):
+        raise ConfigError(field, value, f"an instance of {', '.join(k.__name__ for k in kinds)}")
+
+
 def check_seed(seed: Any) -> int | None:
     """Refuse anything but a whole number from 0, or None."""
     return None if seed is None else check_count("seed", seed, 0)

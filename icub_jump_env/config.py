@@ -5,10 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Self, get_args
+from typing import Any, Literal, Self, TypeVar, get_args
+
+import dacite
 
 from icub_jump_env.checks import (
     check_choice,
+    check_count,
     check_flag,
     check_number,
     check_numbers,
@@ -21,6 +24,15 @@ from icub_jump_env.reference.com_trajectory import (
     ComScaling,
     plan_com_trajectory,
 )
+from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig, ActuatorName
+from icub_jump_env.simulation.randomization import (
+    RANDOMIZATIONS,
+    Randomization,
+    RandomizationName,
+)
+from icub_jump_env.simulation.sensor_models import SENSORS, SensorConfig, SensorName
+
+T = TypeVar("T")
 
 ControllerName = Literal["velocity", "torque"]
 RenderMode = Literal["rgb_array", "human"]
@@ -55,6 +67,12 @@ class JumpConfig:
         control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
             default 200 for the velocity controller and 500 for the torque controller.
         agent_frequency: Rate of ``env.step`` (Hz), a divisor of the control rate.
+        actuators: Model of servos, low-level torque control and motors: a name or an
+            ``ActuatorConfig``.
+        sensors: Errors of the sensors: a name or a ``SensorConfig``.
+        command_delay: Control ticks until a command takes effect (computation time).
+        randomization: What varies from episode to episode: a name or a
+            ``Randomization``.
         stand_time: How long the robot must stand after touch-down (s).
         ankle_shift: Move the ankle pitch range by -15 deg, as the paper did.
         render_mode: None, rgb_array or human.
@@ -74,6 +92,10 @@ class JumpConfig:
     timestep: float = 0.001
     control_frequency: float | None = None
     agent_frequency: float = 100.0
+    actuators: ActuatorName | ActuatorConfig = "ideal"
+    sensors: SensorName | SensorConfig = "ideal"
+    command_delay: int = 0
+    randomization: RandomizationName | Randomization = "none"
     stand_time: float = 2.0
     ankle_shift: bool = True
     render_mode: RenderMode | None = None
@@ -99,11 +121,25 @@ class JumpConfig:
         )
         self._store("timestep", check_number("timestep", self.timestep, *TIMESTEP_RANGE))
         self._store("stand_time", check_number("stand_time", self.stand_time, *STAND_TIME_RANGE))
+        self._check_models()
         self._check_rates()
         plan_com_trajectory(self.jump_height, self.com_displacement, self.com_scaling)
 
     def _store(self, field: str, value: Any) -> None:
         object.__setattr__(self, field, value)
+
+    def _check_models(self) -> None:
+        for field, names, kind in (
+            ("actuators", ACTUATORS, ActuatorConfig),
+            ("sensors", SENSORS, SensorConfig),
+            ("randomization", RANDOMIZATIONS, Randomization),
+        ):
+            value = getattr(self, field)
+            if isinstance(value, Mapping):
+                self._store(field, _from_mapping(field, value, kind))
+            elif not isinstance(value, kind):
+                check_choice(field, value, tuple(names))
+        self._store("command_delay", check_count("command_delay", self.command_delay, 0))
 
     def _check_rates(self) -> None:
         physics = 1.0 / self.timestep
@@ -125,6 +161,22 @@ class JumpConfig:
                 "agent_frequency", agent, f"a divisor of the control rate of {control:g} Hz"
             )
         self._store("agent_frequency", agent)
+
+    @property
+    def actuator_config(self) -> ActuatorConfig:
+        """The actuator models, by name or as given."""
+        return ACTUATORS[self.actuators] if isinstance(self.actuators, str) else self.actuators
+
+    @property
+    def sensor_config(self) -> SensorConfig:
+        """The sensor errors, by name or as given."""
+        return SENSORS[self.sensors] if isinstance(self.sensors, str) else self.sensors
+
+    @property
+    def randomization_config(self) -> Randomization:
+        """The ranges, by name or as given."""
+        ranges = self.randomization
+        return RANDOMIZATIONS[ranges] if isinstance(ranges, str) else ranges
 
     @property
     def control_rate(self) -> float:
@@ -175,3 +227,13 @@ class JumpConfig:
             if name != "jump_height":
                 raise ConfigError(f"options[{name!r}]", value, "the only option is 'jump_height'")
         return dataclasses.replace(self, **options)
+
+
+def _from_mapping(field: str, values: Mapping[str, Any], kind: type[T]) -> T:
+    """A ``kind`` from a plain mapping, such as a configuration that was saved as JSON."""
+    try:
+        return dacite.from_dict(kind, values, dacite.Config(strict=True, cast=[tuple]))
+    except dacite.DaciteError as error:
+        raise ConfigError(
+            field, dict(values), f"a {kind.__name__} or its fields; {error}"
+        ) from None

@@ -28,11 +28,9 @@ from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.statics import holding_torque
-from icub_jump_env.simulation.actuators import JointServo
-from icub_jump_env.simulation.ground_truth import GroundTruth
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.rendering import Renderer, make_renderer
-from icub_jump_env.simulation.sensors import Sensors
+from icub_jump_env.simulation.simulation import Simulation
 from icub_jump_env.snapshot import Snapshot
 
 FALLEN_TILT = math.radians(60.0)
@@ -40,9 +38,6 @@ FALLEN_TILT = math.radians(60.0)
 
 TAKEOFF_GRACE = 0.5
 """Time after T (s) within which the robot must have left the ground."""
-
-SETTLING_TIME = 0.3
-"""Time (s) that a reset lets the soles settle into the floor before the jump starts."""
 
 
 class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -81,6 +76,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     the registration only guards.
 
     ## Info
+    At reset: ``world`` (what was drawn, :class:`icub_jump_env.simulation.randomization.World`).
     Every step: ``jump`` (dict of :class:`icub_jump_env.metrics.jump.JumpMetrics`, final
     at the end), ``is_success``, ``outcome``, ``phase``, ``time``, ``diverged``,
     ``jump_height``, ``solver_status``, ``solver_primal_residual``,
@@ -116,12 +112,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
 
         cfg = self.config
-        self._physics = Physics(
-            cfg.timestep, cfg.ankle_shift, visuals=self.render_mode is not None
+        self._simulation = Simulation(
+            Physics(cfg.timestep, cfg.ankle_shift, visuals=self.render_mode is not None),
+            cfg.actuator_config,
+            cfg.sensor_config,
+            cfg.randomization_config,
+            cfg.command_delay,
         )
-        self._truth = GroundTruth(self._physics)
-        self._sensors = Sensors(self._physics)
-        self._servo = JointServo(cfg.timestep)
         self._estimator = FeetFixedEstimator(FeetFixedKinematics(cfg.ankle_shift))
         limits = self._joint_limits()
         self._recorder = JumpRecorder(limits, cfg.stand_time)
@@ -138,17 +135,17 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._observation = np.zeros(observation.SIZE, np.float32)
         self._renderer: Renderer | None = None
         if self.render_mode is not None:
-            self._renderer = make_renderer(self._physics, self.render_mode)
+            self._renderer = make_renderer(self._simulation.physics, self.render_mode)
 
     @property
     def model(self) -> Any:
         """The ``mujoco.MjModel``."""
-        return self._physics.model
+        return self._simulation.physics.model
 
     @property
     def data(self) -> Any:
         """The ``mujoco.MjData``."""
-        return self._physics.data
+        return self._simulation.physics.data
 
     @property
     def dt(self) -> float:
@@ -174,12 +171,14 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         episode = self.config.with_options(options)
         super().reset(seed=check_seed(seed))
         self._episode = episode
-        self._settle()
-        self._sense()
-        self._start_com[:] = self._estimator.com
         trajectory = plan_com_trajectory(
             episode.jump_height, episode.com_displacement, episode.com_scaling
         )
+        self._simulation.reset(
+            self.np_random, self._crouch_qpos, self._crouch_torque, trajectory.duration
+        )
+        self._sense()
+        self._start_com[:] = self._estimator.com
         self._controller.reset(trajectory, self._start_com)
         self._recorder.reset()
         self._outcome = "running"
@@ -187,7 +186,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._observe()
         if self.render_mode == "human":
             self.render()
-        return self._observation.copy(), self._info()
+        return self._observation.copy(), self._info() | {"world": self._simulation.world.as_dict()}
 
     def step(
         self, action: NDArray[np.float32]
@@ -236,7 +235,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def snapshot(self) -> Snapshot:
         """True state, reference and command at the present instant, for logs and figures."""
-        truth = self._truth.read()
+        truth, actuators = self._simulation.truth.read(), self._simulation.actuators
         launching = self._controller.phases.phase is Phase.LAUNCH
         reference = self._controller.reference.position if launching else np.full(3, np.nan)
         return Snapshot(
@@ -244,11 +243,12 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             phase=self._controller.phases.phase.name.lower(),
             joint_position=truth.joint_position.copy(),
             joint_velocity=truth.joint_velocity.copy(),
-            joint_velocity_command=self._servo.velocity_command.copy(),
+            joint_velocity_command=actuators.velocity_command.copy(),
             joint_torque=truth.joint_torque.copy(),
-            joint_torque_command=self._servo.torque_command.copy(),
+            joint_torque_command=actuators.torque_command.copy(),
             com=truth.com.copy(),
             com_velocity=truth.com_velocity.copy(),
+            com_estimate=self._estimator.com.copy(),
             com_reference=reference.copy(),
             base_pitch=truth.base_pitch,
             ground_force=truth.ground_force,
@@ -266,12 +266,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._sense()
+        self._estimate()
         if self.render_mode is not None:
-            self._renderer = make_renderer(self._physics, self.render_mode)
+            self._renderer = make_renderer(self._simulation.physics, self.render_mode)
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
-        physics, sensors = self._physics, self._sensors
+        simulation = self._simulation
+        physics, sensors = simulation.physics, simulation.sensors
         if physics.diverged or not physics.valid:
             self._outcome = "diverged"
             return
@@ -286,13 +287,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if tick.report is not None:
             self._report = worse(self._report, tick.report)
             self._recorder.metrics.solver_failures += float(tick.report.failed)
-        self._servo.command(tick.command)
+        simulation.command(tick.command)
         for _ in range(self.config.physics_per_control):
-            physics.step(self._servo.torque(physics.joint_position, physics.joint_velocity))
+            simulation.step()
             if physics.diverged:
                 self._outcome = "diverged"
                 return
-            self._recorder.update(self._truth.read())
+            self._recorder.update(simulation.truth.read())
             self._outcome = self._judge()
             if self._outcome != "running":
                 break
@@ -300,12 +301,15 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _sense(self) -> None:
         """Take sensor readings and the estimates made of them, once per control tick."""
-        sensors = self._sensors
-        sensors.read()
+        self._simulation.sense()
+        self._estimate()
+
+    def _estimate(self) -> None:
+        sensors = self._simulation.sensors
         self._estimator.update(sensors.joint_position, sensors.joint_velocity)
 
     def _judge(self) -> str:
-        truth = self._truth.state
+        truth = self._simulation.truth.state
         if not truth.only_feet_touch or truth.chest_tilt > FALLEN_TILT:
             return "fell"
         if self._recorder.stood:
@@ -319,14 +323,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         ):
             return "no take-off"
         return "running"
-
-    def _settle(self) -> None:
-        physics, servo = self._physics, self._servo
-        physics.reset(self._crouch_qpos)
-        servo.reset(self._crouch, self._crouch_torque)
-        for _ in range(round(SETTLING_TIME / self.config.timestep)):
-            physics.step(servo.torque(physics.joint_position, physics.joint_velocity))
-        physics.start_from_rest()
 
     def _crouch_configuration(self) -> NDArray[np.float64]:
         """Pinocchio's configuration (30,) of the crouch with the soles on the floor."""
@@ -345,13 +341,17 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return VelocityController(crouch, positions, cfg.control_dt, *options)
 
     def _joint_limits(self) -> JointLimits:
-        lower, upper = self._physics.model.jnt_range[1:].T
+        lower, upper = self._simulation.physics.model.jnt_range[1:].T
         return JointLimits(lower, upper, facts.VELOCITY_LIMIT, facts.EFFORT_LIMIT)
 
     def _observe(self) -> None:
-        sensors, estimator, controller = self._sensors, self._estimator, self._controller
+        sensors, estimator, controller = (
+            self._simulation.sensors,
+            self._estimator,
+            self._controller,
+        )
         phase, trajectory = controller.phases.phase, controller.trajectory
-        reference, time = controller.reference, self._physics.data.time
+        reference, time = controller.reference, self._simulation.physics.data.time
         one_hot = np.zeros(len(Phase))
         one_hot[phase] = 1.0
         com_error = np.zeros(3)
@@ -387,7 +387,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "outcome": self._outcome,
             "diverged": self._outcome == "diverged",
             "phase": self._controller.phases.phase.name.lower(),
-            "time": float(self._physics.data.time),
+            "time": float(self._simulation.physics.data.time),
             "jump_height": self._episode.jump_height,
             "solver_status": str(report.status),
             "solver_primal_residual": report.residuals.primal,

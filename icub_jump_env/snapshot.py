@@ -25,6 +25,8 @@ class Snapshot:
             torque control.
         com: (3,) true CoM position (m).
         com_velocity: (3,) true CoM velocity (m/s).
+        com_estimate: (3,) CoM position that the controllers believe in (m): from the encoders,
+            as if the feet stood still.
         com_reference: (3,) CoM reference (m); NaN after the launching phase.
         base_pitch: Pitch of the base (rad), zero when upright.
         ground_force: Vertical ground force (N).
@@ -39,6 +41,7 @@ class Snapshot:
     joint_torque_command: Array
     com: Array
     com_velocity: Array
+    com_estimate: Array
     com_reference: Array
     base_pitch: float
     ground_force: float

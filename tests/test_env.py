@@ -377,7 +377,7 @@ class TestEpisodeEnd:
         *_, terminated, _, info = env.step(ZERO)
         assert terminated
         assert info["outcome"] == "fell"
-        assert env._truth.state.chest_tilt < math.radians(40)
+        assert env._simulation.truth.state.chest_tilt < math.radians(40)
 
     def test_a_tilt_of_more_than_60_degrees_is_a_fall(self):
         """Without contact: the robot turns in the air."""
@@ -389,8 +389,8 @@ class TestEpisodeEnd:
         while not terminated:
             *_, terminated, _, info = env.step(ZERO)
         assert info["outcome"] == "fell"
-        assert env._truth.state.only_feet_touch
-        assert math.degrees(env._truth.state.chest_tilt) == pytest.approx(60.0, abs=1.5)
+        assert env._simulation.truth.state.only_feet_touch
+        assert math.degrees(env._simulation.truth.state.chest_tilt) == pytest.approx(60.0, abs=1.5)
 
     def test_fall_ends_it(self):
         *_, info = rollout(gymnasium.make("ICubJump-v0", momentum_control=False))
@@ -401,7 +401,7 @@ class TestEpisodeEnd:
     def test_no_take_off_ends_it(self):
         """Motors that can just hold the crouch never leave the ground."""
         env = gymnasium.make("ICubJump-v0").unwrapped
-        env._servo._effort = np.abs(env._crouch_torque) + 1.0
+        env._simulation.actuators._motor._effort = np.abs(env._crouch_torque) + 1.0
         *_, info = rollout(env)
         assert info["outcome"] == "no take-off"
         assert info["time"] == pytest.approx(0.43 + 0.5, abs=0.011)
@@ -435,7 +435,7 @@ class TestEpisodeEnd:
         while not terminated:
             action = [0.3, 0, -1] if env.data.time < 0.1 else ZERO
             _, _, terminated, _, info = env.step(action)
-            tilt = max(tilt, env._truth.state.chest_tilt)
+            tilt = max(tilt, env._simulation.truth.state.chest_tilt)
         assert math.degrees(tilt) > 30.0
         assert info["is_success"]
 

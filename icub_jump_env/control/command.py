@@ -28,3 +28,11 @@ class JointCommand(NamedTuple):
     velocity: Array = _AT_REST
     position: Array | None = None
     torque: Array | None = None
+
+    def copy(self) -> JointCommand:
+        """A copy that outlives the controller's next tick, which may reuse its arrays."""
+        return JointCommand(
+            self.velocity.copy(),
+            None if self.position is None else self.position.copy(),
+            None if self.torque is None else self.torque.copy(),
+        )

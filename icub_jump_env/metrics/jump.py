@@ -72,6 +72,10 @@ class JumpMetrics:
         angular_momentum_takeoff: Angular momentum about the CoM at take-off, world
             axes (kg m^2/s).
         peak_ground_force: Largest vertical ground force of the episode (N).
+        sole_slip: Largest horizontal way of a sole's centre on the ground (m), from where it
+            stood at the start or at touch-down, while the chest is within 30 deg of upright.
+        chest_lean: Forward and leftward lean of the chest at the end (rad), in the sagittal and
+            the frontal plane.
         landed: Whether, ``stand_time`` after touch-down, only the feet have touched the
             ground and the chest is within 30 deg of upright.
         solver_failures: Control ticks whose QP solution was not applied.
@@ -90,6 +94,8 @@ class JumpMetrics:
     base_pitch_range: float = UNDEFINED
     angular_momentum_takeoff: tuple[float, float, float] = (UNDEFINED, UNDEFINED, UNDEFINED)
     peak_ground_force: float = 0.0
+    sole_slip: float = 0.0
+    chest_lean: tuple[float, float] = (0.0, 0.0)
     landed: bool = False
     solver_failures: float = 0.0
     limit_violations: float = 0.0
@@ -157,6 +163,7 @@ class JumpRecorder:
         self._best_apex = -math.inf
         self._last_time: float | None = None
         self._only_feet = True
+        self._footholds: tuple[list[float], ...] | None = None
 
     @property
     def stood(self) -> bool:
@@ -177,13 +184,26 @@ class JumpRecorder:
         if self._violates(state):
             metrics.limit_violations += 1.0
 
+        upright = state.chest_tilt < LANDED_TILT
         if state.ground_force < AIRBORNE_FORCE:
             if self._flight is None:
                 self._flight = _take_off(state)
             self._fly(self._flight, state, dt)
         elif self._flight is not None:
             self._touch_down(self._flight, state.time)
-        metrics.landed = self._only_feet and self.stood and state.chest_tilt < LANDED_TILT
+        elif upright:
+            self._slip(state)
+        x, y, z = state.chest_up
+        metrics.chest_lean = math.atan2(x, z), math.atan2(y, z)
+        metrics.landed = self._only_feet and self.stood and upright
+
+    def _slip(self, state: TrueState) -> None:
+        if self._footholds is None:
+            self._footholds = tuple(sole.tolist() for sole in state.sole_position)
+        for sole, foothold in zip(state.sole_position, self._footholds, strict=True):
+            way = math.hypot(sole[0] - foothold[0], sole[1] - foothold[1])
+            if way > self.metrics.sole_slip:
+                self.metrics.sole_slip = way
 
     def _violates(self, state: TrueState) -> bool:
         return bool(
@@ -223,6 +243,7 @@ class JumpRecorder:
         if flight.duration >= CHATTER_TIME and flight.apex >= self._best_apex:
             self.metrics.flight_time = time - flight.time
             self.touchdown_time = time
+            self._footholds = None
         self._flight = None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +28,8 @@ class TrueState:
         sole_height: Height of the lowest corner of the lower sole (m).
         only_feet_touch: Whether nothing but the soles touches the ground.
         base_pitch: Pitch of the base about +y, zero when upright (rad).
-        chest_tilt: Angle between the chest's up axis and +z (rad).
+        sole_position: Centres of the left and the right sole, (3,) each.
+        chest_up: (3,) the chest's up axis.
         joint_position: (n,) rad.
         joint_velocity: (n,) rad/s.
         joint_torque: (n,) Nm.
@@ -42,7 +44,13 @@ class TrueState:
     sole_height: float = 0.0
     only_feet_touch: bool = True
     base_pitch: float = 0.0
-    chest_tilt: float = 0.0
+    sole_position: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
+    chest_up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     joint_position: Array = field(default_factory=lambda: np.zeros(0))
     joint_velocity: Array = field(default_factory=lambda: np.zeros(0))
     joint_torque: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def chest_tilt(self) -> float:
+        """Angle between the chest's up axis and +z (rad)."""
+        return math.acos(min(1.0, max(-1.0, float(self.chest_up[2]))))

@@ -34,17 +34,20 @@ class GroundTruth:
             joint_position=data.sensordata[_span(model, "position")],
             joint_velocity=data.sensordata[_span(model, "velocity")],
             joint_torque=data.actuator_force,
+            # The chest's up axis is the y axis of its link frame.
+            chest_up=data.xmat[model.body(facts.CHEST_LINK).id].reshape(3, 3)[:, 1],
         )
         self._floor = data.sensor("floor_force").data
         self._soles_touching = [data.sensor(f"{side}_sole_force").data for side in "lr"]
         # Body 1 heads the kinematic tree: its composite inertia is about the CoM.
         self._composite_inertia = data.crb[1]
         self._base_rotation = data.xmat[model.body(facts.BASE_LINK).id]
-        self._chest_rotation = data.xmat[model.body(facts.CHEST_LINK).id]
+        left, right = (model.geom(sole_geom(side)).id for side in "lr")
         self._soles = [
             (data.geom_xpos[geom], data.geom_xmat[geom], model.geom_size[geom])
-            for geom in (model.geom(sole_geom(side)).id for side in "lr")
+            for geom in (left, right)
         ]
+        self.state.sole_position = data.geom_xpos[left], data.geom_xpos[right]
 
     def __reduce__(self) -> tuple[type[GroundTruth], tuple[Physics]]:
         # Views of MuJoCo's arrays have to be taken anew from a copy's own data.
@@ -60,9 +63,6 @@ class GroundTruth:
         state.only_feet_touch = bool(self._floor[0] == n_soles)
         state.sole_height = min(_lowest_corner(*sole) for sole in self._soles)
         state.base_pitch = math.asin(min(1.0, max(-1.0, self._base_rotation[6])))
-        state.chest_tilt = math.acos(
-            min(1.0, max(-1.0, float(self._chest_rotation[6:] @ _CHEST_UP)))
-        )
         xx, yy, zz, xy, xz, yz = self._composite_inertia[:6]
         state.locked_inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         return state
@@ -72,10 +72,6 @@ def _span(model: Any, quantity: str) -> slice:
     """Where the sensors of all joints stand in ``sensordata``."""
     start = model.sensor(f"{facts.JOINT_NAMES[0]}_{quantity}").adr[0]
     return slice(start, start + facts.N_JOINTS)
-
-
-_CHEST_UP = np.array([0.0, 1.0, 0.0])
-"""The chest's up axis in its own link frame."""
 
 
 def _lowest_corner(position: np.ndarray, rotation: np.ndarray, half_size: np.ndarray) -> float:

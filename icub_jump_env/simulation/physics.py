@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.robot import facts
 from icub_jump_env.robot.mujoco_model import build_model
 
 Array = NDArray[np.float64]
@@ -20,7 +21,8 @@ class Physics:
     """One iCub on a floor.
 
     The state is written in :meth:`reset` alone; after it forces enter only as joint
-    torques through ``data.ctrl``.
+    torques through ``data.ctrl``, and as a push on the chest through
+    ``data.xfrc_applied`` where one is drawn.
 
     Attributes:
         model: The MuJoCo model.
@@ -41,6 +43,7 @@ class Physics:
         self.joint_position = data.qpos[7:]
         self.joint_velocity = data.qvel[6:]
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._chest_force = data.xfrc_applied[self.model.body(facts.CHEST_LINK).id]
         self._warnings = data.warning.number
         self._last_time = data.time
         self.evaluated_time = data.time
@@ -73,9 +76,15 @@ class Physics:
         self.data.time = self._last_time = self.evaluated_time = 0.0
         mujoco.mj_forward(self.model, self.data)
 
-    def step(self, torque: Array) -> None:
-        """Advance by one physics step under (23,) joint torques (Nm)."""
+    def step(self, torque: Array, push: float = 0.0) -> None:
+        """Advance by one physics step.
+
+        Args:
+            torque: (23,) joint torques (Nm).
+            push: Force on the chest's CoM along +x (N).
+        """
         self._ctrl[:] = torque
+        self._chest_force[0] = push
         self.evaluated_time = self.data.time
         mujoco.mj_step(self.model, self.data)
         time = self.data.time

@@ -1,14 +1,38 @@
-"""The robot's sensors, ideal: encoders, base IMU and foot force sensors."""
+"""The robot's sensors: encoders, base IMU and force/torque sensors under the feet."""
 
 from __future__ import annotations
 
+from collections import deque
+from typing import Any
+
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.robot import facts
+from icub_jump_env.robot.mujoco_model import sole_geom
 from icub_jump_env.simulation.physics import Physics
+from icub_jump_env.simulation.randomization import World
+from icub_jump_env.simulation.sensor_models import (
+    SENSORS,
+    ErrorSource,
+    SensorConfig,
+    SensorError,
+)
 
 Array = NDArray[np.float64]
+
+_CHANNELS = {
+    "joint_position": facts.N_JOINTS,
+    "joint_velocity": facts.N_JOINTS,
+    "tilt": 3,
+    "gyro": 3,
+    "force": 6,
+    "moment": 6,
+}
+
+
+_VIEWS = ("_imu_rotation", "_imu_gyro", "_sole_forces")
 
 
 class Sensors:
@@ -25,28 +49,114 @@ class Sensors:
         gravity: (3,) direction of gravity in the IMU frame, unit vector.
         gyro: (3,) angular velocity of the base in the IMU frame (rad/s).
         foot_force: (2,) normal force under the left and right sole (N).
+        encoder_bias: (23,) constant part of the encoders' error (rad).
+        biased: Whether any of it is not zero.
+        torque_error: (23,) what the errors of the feet's force/torque sensors do to the
+            joint torques computed from them (Nm): J^T times the wrench's error.
     """
 
-    def __init__(self, physics: Physics) -> None:
+    def __init__(self, physics: Physics, config: SensorConfig) -> None:
+        """Set up the sensors of ``physics``; :meth:`reset` comes before the first reading."""
         self._physics = physics
-        data = physics.data
-        self._imu_rotation = data.site("imu").xmat
+        self._config = config
+        self._bind()
+        n = facts.N_JOINTS
+        self.joint_position, self.joint_velocity = np.zeros(n), np.zeros(n)
+        self.gravity, self.gyro = np.zeros(3), np.zeros(3)
+        self.foot_force = np.zeros(2)
+        self.encoder_bias, self.torque_error = np.zeros(n), np.zeros(n)
+        self.biased = False
+        self._world_bias = np.zeros(n)
+        self._down = np.array([0.0, 0.0, -1.0])
+        self._jacobian = np.zeros((6, physics.model.nv))
+        self._errors: dict[str, ErrorSource] = {}
+        self._force_gain = np.zeros(2)
+        self._wrong = self._wrong_forces = False
+        self._history: deque[tuple[Array, ...]] = deque(maxlen=1 + config.delay)
+
+    def _bind(self) -> None:
+        data = self._physics.data
+        self._imu_rotation = data.site("imu").xmat.reshape(3, 3)
         self._imu_gyro = data.sensor("base_gyro").data
         self._sole_forces = [data.sensor(f"{side}_sole_force").data for side in "lr"]
-        self.joint_position = np.zeros(facts.N_JOINTS)
-        self.joint_velocity = np.zeros(facts.N_JOINTS)
-        self.gravity = np.zeros(3)
-        self.gyro = np.zeros(3)
-        self.foot_force = np.zeros(2)
 
-    def __reduce__(self) -> tuple[type[Sensors], tuple[Physics]]:
-        return Sensors, (self._physics,)
+    def __getstate__(self) -> dict[str, Any]:
+        # Views of MuJoCo's arrays have to be taken anew from a copy's own data.
+        return {name: value for name, value in self.__dict__.items() if name not in _VIEWS}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
+
+    def reset(self, world: World, seed: int) -> None:
+        """Draw the errors of an episode in ``world``; ``seed`` is that of all noise."""
+        rng = np.random.default_rng(seed)
+        config = self._config.with_noise_of(SENSORS["realistic"], world.sensor_noise)
+        self._errors = {
+            kind: ErrorSource(getattr(config, kind), size, rng)
+            for kind, size in _CHANNELS.items()
+            if getattr(config, kind) != SensorError()
+        }
+        self._force_gain = config.force_gain * rng.uniform(-1.0, 1.0, 2)
+        self._wrong_forces = config.force_gain > 0.0 or not {"force", "moment"}.isdisjoint(
+            self._errors
+        )
+        self._wrong = self._wrong_forces or bool(self._errors)
+        self.encoder_bias[:] = world.encoder_bias
+        if "joint_position" in self._errors:
+            self.encoder_bias += self._errors["joint_position"].bias
+        self.biased = bool(self.encoder_bias.any())
+        self._world_bias[:] = world.encoder_bias
+        gravity = self._physics.model.opt.gravity
+        self._down[:] = gravity / np.linalg.norm(gravity)
+        self._history.clear()
 
     def read(self) -> None:
         """Take new readings."""
         self.joint_position[:] = self._physics.joint_position
+        self.joint_position += self._world_bias
         self.joint_velocity[:] = self._physics.joint_velocity
-        np.negative(self._imu_rotation[6:], out=self.gravity)
+        np.dot(self._down, self._imu_rotation, out=self.gravity)
         self.gyro[:] = self._imu_gyro
         for foot, force in enumerate(self._sole_forces):
             self.foot_force[foot] = force[3]
+        if self._wrong:
+            self._falsify()
+        if self._config.delay:
+            self._postpone()
+
+    def _falsify(self) -> None:
+        time = self._physics.data.time
+        error = {kind: source.at(time) for kind, source in self._errors.items()}
+        self.joint_position += error.get("joint_position", 0.0)
+        self.joint_velocity += error.get("joint_velocity", 0.0)
+        self.gyro += error.get("gyro", 0.0)
+        if "tilt" in error:
+            self.gravity += np.cross(error["tilt"], self.gravity)
+            self.gravity /= np.linalg.norm(self.gravity)
+        if self._wrong_forces:
+            forces = error.get("force", np.zeros(6)).reshape(2, 3)
+            moments = error.get("moment", np.zeros(6)).reshape(2, 3)
+            self._falsify_forces(forces, moments)
+
+    def _falsify_forces(self, force_errors: Array, moment_errors: Array) -> None:
+        model, data = self._physics.model, self._physics.data
+        self.torque_error[:] = 0.0
+        for foot, side in enumerate("lr"):
+            force = force_errors[foot] + self._force_gain[foot] * self._sole_forces[foot][1:4]
+            self.foot_force[foot] += force[2]
+            geom = model.geom(sole_geom(side)).id
+            mujoco.mj_jac(
+                model, data, self._jacobian[:3], self._jacobian[3:],
+                data.geom_xpos[geom], model.geom_bodyid[geom],
+            )  # fmt: skip
+            wrench = np.concatenate((force, moment_errors[foot]))
+            self.torque_error -= self._jacobian[:, 6:].T @ wrench
+
+    def _postpone(self) -> None:
+        present = (
+            self.joint_position, self.joint_velocity, self.gravity, self.gyro, self.foot_force
+        )  # fmt: skip
+        self._history.append(tuple(reading.copy() for reading in present))
+        for reading, past in zip(present, self._history[0], strict=True):
+            reading[:] = past

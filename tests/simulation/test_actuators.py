@@ -1,4 +1,6 @@
-"""Joint servos: limits, tracking, no wind-up."""
+"""Actuators: limits, tracking, no wind-up, torque loops, friction, motors."""
+
+import math
 
 import numpy as np
 import pytest
@@ -8,88 +10,241 @@ from hypothesis import strategies as st
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.robot import facts
-from icub_jump_env.simulation.actuators import JointServo, ServoGains
+from icub_jump_env.simulation.actuators.actuators import Actuators
+from icub_jump_env.simulation.actuators.config import ACTUATORS, FRICTION, ActuatorConfig
+from icub_jump_env.simulation.actuators.motors import DCMotor, RatedMotor
+from icub_jump_env.simulation.actuators.servo import ServoGains
+from icub_jump_env.simulation.actuators.torque_loops import (
+    CurrentControl,
+    IdealTorque,
+    TorqueFeedback,
+)
 
 DT = 0.001
 N = facts.N_JOINTS
-zeros = np.zeros(N)
+zeros, ones = np.zeros(N), np.ones(N)
 vectors = st.integers(0, 10_000).map(lambda seed: np.random.default_rng(seed).normal(size=N))
 
 
-@given(vectors, vectors, vectors, st.floats(0.0, 50.0))
-def test_torque_stays_within_the_limits(position, velocity, command, size):
-    servo = JointServo(DT)
-    servo.reset(zeros, zeros)
-    servo.command(JointCommand(size * command))
-    for _ in range(5):
-        torque = servo.torque(size * position, size * velocity)
-        assert (np.abs(torque) <= facts.EFFORT_LIMIT).all()
+def actuators(position=zeros, torque=zeros, **models) -> Actuators:
+    made = Actuators(ActuatorConfig(**models), DT)
+    made.reset(position, torque)
+    return made
 
 
-@given(st.floats(0.0, 1.0))
-def test_no_torque_drives_a_joint_beyond_its_top_speed(share):
-    """At 1.03 x the speed limit the torque in the direction of motion is gone."""
-    servo = JointServo(DT)
-    servo.reset(zeros, zeros)
-    servo.command(JointCommand(10 * facts.VELOCITY_LIMIT))
-    speed = facts.VELOCITY_LIMIT * (1.0 + 0.03 * share)
-    torque = servo.torque(zeros, speed)
-    np.testing.assert_allclose(torque, facts.EFFORT_LIMIT * (1 - share), atol=1e-9)
-    assert (servo.torque(zeros, 1.05 * facts.VELOCITY_LIMIT) < 0).all()
+class TestLimits:
+    @given(vectors, vectors, vectors, st.floats(0.0, 50.0), st.sampled_from(sorted(ACTUATORS)))
+    def test_motor_torque_stays_within_the_limits(self, position, velocity, command, size, name):
+        made = Actuators(ACTUATORS[name], DT)
+        made.reset(zeros, zeros)
+        most = facts.EFFORT_LIMIT * (1 + ACTUATORS[name].friction)
+        for wanted in (JointCommand(size * command), JointCommand(torque=size * 10 * command)):
+            made.command(wanted)
+            for _ in range(5):
+                torque = made.torque(size * position, size * velocity)
+                assert (np.abs(torque) <= most + 1e-9).all()
+
+    @given(st.floats(0.0, 1.0))
+    def test_no_torque_drives_a_joint_beyond_its_top_speed(self, share):
+        """At 1.03 x the speed limit the torque in the direction of motion is gone."""
+        made = actuators()
+        made.command(JointCommand(10 * facts.VELOCITY_LIMIT))
+        speed = facts.VELOCITY_LIMIT * (1.0 + 0.03 * share)
+        torque = made.torque(zeros, speed)
+        np.testing.assert_allclose(torque, facts.EFFORT_LIMIT * (1 - share), atol=1e-9)
+        assert (made.torque(zeros, 1.05 * facts.VELOCITY_LIMIT) < 0).all()
+
+    def test_weak_motors_give_their_share(self, rng):
+        strength = rng.uniform(0.5, 1.0, N)
+        made = Actuators(ActuatorConfig(), DT, strength=strength)
+        made.reset(zeros, zeros)
+        made.command(JointCommand(torque=1e3 * ones))
+        np.testing.assert_allclose(made.torque(zeros, zeros), strength * facts.EFFORT_LIMIT)
+
+    def test_dc_motor_follows_current_and_voltage(self):
+        motor = DCMotor(current_limit=0.7, voltage_limit=0.9, stall_torque=3.0, no_load_speed=1.2)
+        made = actuators(motor=motor)
+        made.command(JointCommand(torque=1e3 * ones))
+        for speed in np.linspace(-1.2, 1.3, 11):  # in speed limits
+            line = 3.0 * (0.9 - speed / 1.2)
+            share = max(-0.7, min(0.7, line))
+            torque = made.torque(zeros, speed * facts.VELOCITY_LIMIT)
+            np.testing.assert_allclose(torque, share * facts.EFFORT_LIMIT, atol=1e-9)
+
+    def test_raised_limits_are_the_default(self):
+        """The documented corner: full torque until 0.94, 0.8 of it at the speed limit."""
+        made = actuators(motor=DCMotor())
+        made.command(JointCommand(torque=1e3 * ones))
+        for speed, share in ((0.93, 1.0), (0.9375, 1.0), (1.0, 0.8), (1.25, 0.0)):
+            torque = made.torque(zeros, speed * facts.VELOCITY_LIMIT)
+            np.testing.assert_allclose(torque, share * facts.EFFORT_LIMIT, atol=1e-9)
 
 
-def test_reset_holds_with_the_given_torque(rng):
-    torque = 0.5 * facts.EFFORT_LIMIT * rng.uniform(-1, 1, N)
-    servo = JointServo(DT)
-    servo.reset(facts.CROUCH, torque)
-    np.testing.assert_allclose(servo.torque(facts.CROUCH, zeros), torque, atol=1e-9)
+class TestServo:
+    def test_reset_holds_with_the_given_torque(self, rng):
+        torque = 0.5 * facts.EFFORT_LIMIT * rng.uniform(-1, 1, N)
+        made = actuators(facts.CROUCH, torque)
+        np.testing.assert_allclose(made.torque(facts.CROUCH, zeros), torque, atol=1e-9)
+
+    @pytest.mark.parametrize("name", ["ideal", "realistic"])
+    def test_velocity_command_is_tracked_without_offset(self, rng, name):
+        """A joint of known inertia under a constant load reaches the commanded velocity."""
+        inertia, load = facts.ARMATURE + 0.05, 0.3 * facts.EFFORT_LIMIT
+        goal = 0.3 * facts.VELOCITY_LIMIT * np.sign(rng.normal(size=N))
+        made = Actuators(ACTUATORS[name], DT)
+        made.reset(zeros, zeros)
+        made.command(JointCommand(goal))
+        s, s_dot = np.zeros(N), np.zeros(N)
+        for _ in range(1500):
+            s_dot = s_dot + DT * (made.torque(s, s_dot) - load) / inertia
+            s = s + DT * s_dot
+        np.testing.assert_allclose(s_dot, goal, atol=1e-3)
+
+    def test_position_command_replaces_the_reference(self):
+        made = actuators()
+        made.command(JointCommand(zeros, position=np.full(N, 0.001)))
+        np.testing.assert_allclose(made.torque(zeros, zeros), 0.001 * ServoGains().stiffness)
+
+    def test_gains_are_scaled_per_joint(self, rng):
+        scale = rng.uniform(0.5, 1.5, N)
+        made = Actuators(ActuatorConfig(), DT, gain_scale=scale)
+        made.reset(zeros, zeros)
+        made.command(JointCommand(zeros, position=np.full(N, 0.001)))
+        gains = ServoGains()
+        np.testing.assert_allclose(
+            made.torque(zeros, np.full(N, 0.1)),
+            scale * (0.001 * gains.stiffness - 0.1 * gains.damping),
+        )
+
+    def test_does_not_wind_up(self):
+        """After a long time against a stop, reversing the command acts at once."""
+        made = actuators()
+        made.command(JointCommand(facts.VELOCITY_LIMIT))
+        for _ in range(3000):
+            torque = made.torque(zeros, zeros)
+        np.testing.assert_allclose(torque, facts.EFFORT_LIMIT)
+        made.command(JointCommand(-facts.VELOCITY_LIMIT))
+        steps = next(i for i in range(100) if (made.torque(zeros, zeros) < 0).all())
+        assert steps * DT <= 0.02
+
+    def test_reset_forgets_the_command(self):
+        made = actuators()
+        made.command(JointCommand(facts.VELOCITY_LIMIT))
+        made.reset(zeros, zeros)
+        assert not made.velocity_command.any()
+        assert not made.torque(zeros, zeros).any()
 
 
-def test_velocity_command_is_tracked_without_offset(rng):
-    """A joint of known inertia under a constant load reaches the commanded velocity."""
-    inertia, load = facts.ARMATURE + 0.05, 0.3 * facts.EFFORT_LIMIT
-    goal = 0.3 * facts.VELOCITY_LIMIT * np.sign(rng.normal(size=N))
-    servo = JointServo(DT)
-    servo.reset(zeros, zeros)
-    servo.command(JointCommand(goal))
-    s, s_dot = np.zeros(N), np.zeros(N)
-    for _ in range(1500):
-        s_dot = s_dot + DT * (servo.torque(s, s_dot) - load) / inertia
-        s = s + DT * s_dot
-    np.testing.assert_allclose(s_dot, goal, atol=1e-3)
+class TestTorqueLoops:
+    def step_response(self, loop, steps, goal=5.0, velocity=zeros, friction=0.0, error=0.0):
+        """Joint torques at each step after a step of the command from 0 to ``goal``."""
+        made = actuators(torque_loop=loop, friction=friction)
+        made.torque_error[:] = error
+        made.command(JointCommand(torque=np.full(N, goal)))
+        return np.array([made.torque(zeros, velocity)[0] for _ in range(steps)])
+
+    def test_ideal_is_immediate(self):
+        assert (self.step_response(IdealTorque(), 3) == 5.0).all()
+
+    @pytest.mark.parametrize("bandwidth", [2.0, 10.0, 30.0])
+    def test_feedback_is_a_first_order_lag_of_its_bandwidth(self, bandwidth):
+        response = self.step_response(TorqueFeedback(bandwidth, delay=0.0), 200)
+        time = DT * np.arange(1, 201)
+        expected = 5.0 * (1 - np.exp(-2 * math.pi * bandwidth * time))
+        np.testing.assert_allclose(response, expected, atol=5.0 * 2 * math.pi * bandwidth * DT / 2)
+
+    def test_feedback_rejects_friction_and_current_control_does_not(self):
+        turning = 2.0 * ones
+        friction = 0.05 * facts.EFFORT_LIMIT[0]
+        feedback = self.step_response(TorqueFeedback(20.0), 400, 5.0, turning, friction=0.05)[-1]
+        current = self.step_response(
+            CurrentControl(200.0, 0.6, 1.0), 400, 5.0, turning, friction=0.05
+        )[-1]
+        assert feedback == pytest.approx(5.0, abs=1e-6)
+        assert current == pytest.approx(5.0 - 0.4 * friction, abs=1e-6)
+
+    def test_feedback_follows_the_error_of_the_measurement_and_current_control_does_not(self):
+        assert self.step_response(TorqueFeedback(), 400, error=1.5)[-1] == pytest.approx(3.5)
+        with_error, without = (
+            self.step_response(CurrentControl(), 400, error=error) for error in (1.5, 0.0)
+        )
+        np.testing.assert_array_equal(with_error, without)
+
+    def test_current_control_is_as_good_as_its_torque_constant(self):
+        response = self.step_response(CurrentControl(torque_constant=0.9), 200)
+        assert response[-1] == pytest.approx(4.5, abs=1e-6)
+
+    def test_delay_of_the_measurement_makes_the_loop_overshoot_and_then_unstable(self):
+        calm, swinging, unstable = (
+            self.step_response(TorqueFeedback(bandwidth, delay=0.008), 400).max()
+            for bandwidth in (2.0, 20.0, 60.0)
+        )
+        assert calm <= 5.0 + 1e-9
+        assert 5.5 < swinging < 10.0
+        assert unstable > 20.0  # 2 pi 60 x 0.008 is beyond pi / 2
+
+    def test_feedback_does_not_wind_up(self):
+        made = actuators(torque_loop=TorqueFeedback(20.0, 0.0))
+        made.command(JointCommand(torque=1e4 * ones))
+        for _ in range(1000):
+            made.torque(zeros, zeros)
+        made.command(JointCommand(torque=zeros))
+        for _ in range(50):
+            torque = made.torque(zeros, zeros)
+        assert (np.abs(torque) < 0.01 * facts.EFFORT_LIMIT).all()
+
+    @pytest.mark.parametrize("loop", [TorqueFeedback(), CurrentControl()])
+    def test_torque_control_starts_where_the_servo_left_off(self, rng, loop):
+        holding = 0.5 * facts.EFFORT_LIMIT * rng.uniform(-1, 1, N)
+        made = actuators(facts.CROUCH, holding, torque_loop=loop)
+        made.torque(facts.CROUCH, zeros)
+        made.command(JointCommand(torque=holding))
+        np.testing.assert_allclose(
+            made.torque(facts.CROUCH, zeros), holding, atol=0.03 * facts.EFFORT_LIMIT.max()
+        )
 
 
-def test_position_command_replaces_the_reference():
-    servo = JointServo(DT)
-    servo.reset(zeros, zeros)
-    servo.command(JointCommand(zeros, position=np.full(N, 0.001)))
-    stiffness = ServoGains().stiffness
-    np.testing.assert_allclose(servo.torque(zeros, zeros), 0.001 * stiffness)
+class TestFriction:
+    @given(vectors)
+    def test_opposes_motion_with_the_coulomb_torque(self, velocity):
+        made = actuators(friction=0.1)
+        made.command(JointCommand(torque=zeros))
+        torque = made.torque(zeros, velocity)
+        assert (torque * velocity <= 0).all()
+        assert (np.abs(torque) <= 0.1 * facts.EFFORT_LIMIT + 1e-12).all()
+        fast = np.abs(velocity) > 0.3
+        np.testing.assert_allclose(
+            torque[fast], -0.1 * (np.sign(velocity) * facts.EFFORT_LIMIT)[fast], rtol=1e-4
+        )
+
+    def test_share_at_the_knee_as_documented(self):
+        knee = facts.JOINT_INDEX["l_knee"]
+        assert FRICTION * facts.EFFORT_LIMIT[knee] == pytest.approx(2.2, abs=0.05)
 
 
-def test_does_not_wind_up():
-    """After a long time against a stop, reversing the command acts at once."""
-    servo = JointServo(DT)
-    servo.reset(zeros, zeros)
-    servo.command(JointCommand(facts.VELOCITY_LIMIT))
-    for _ in range(3000):
-        torque = servo.torque(zeros, zeros)
-    np.testing.assert_allclose(torque, facts.EFFORT_LIMIT)
-    servo.command(JointCommand(-facts.VELOCITY_LIMIT))
-    steps = next(i for i in range(100) if (servo.torque(zeros, zeros) < 0).all())
-    assert steps * DT <= 0.02
-
-
-@pytest.mark.parametrize("values", [{"stiffness": 0.0}, {"damping": -1.0}, {"speed_band": 0.0}])
-def test_bad_gains_are_refused(values):
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        (ServoGains, {"stiffness": 0.0}),
+        (ServoGains, {"damping": -1.0}),
+        (RatedMotor, {"speed_band": 0.0}),
+        (DCMotor, {"current_limit": 1.1}),
+        (DCMotor, {"voltage_limit": math.nan}),
+        (DCMotor, {"stall_torque": 0.5}),
+        (DCMotor, {"no_load_speed": 0.0}),
+        (TorqueFeedback, {"bandwidth": 0.0}),
+        (TorqueFeedback, {"delay": -0.001}),
+        (CurrentControl, {"bandwidth": "fast"}),
+        (CurrentControl, {"friction_compensation": -1.0}),
+        (CurrentControl, {"torque_constant": 0.0}),
+        (ActuatorConfig, {"friction": 2.0}),
+        (ActuatorConfig, {"motor": "dc"}),
+        (ActuatorConfig, {"torque_loop": DCMotor()}),
+        (ActuatorConfig, {"servo": None}),
+        (IdealTorque, {"kind": "perfect"}),
+    ],
+)
+def test_bad_values_are_refused(kind, values):
     with pytest.raises(ConfigError) as refusal:
-        ServoGains(**values)
+        kind(**values)
     assert refusal.value.field in values
-
-
-def test_reset_forgets_the_command():
-    servo = JointServo(DT)
-    servo.command(JointCommand(facts.VELOCITY_LIMIT))
-    servo.reset(zeros, zeros)
-    assert not servo.velocity_command.any()
-    assert not servo.torque(zeros, zeros).any()

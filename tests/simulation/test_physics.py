@@ -10,6 +10,7 @@ from icub_jump_env.robot.frames import pinocchio_q, pinocchio_v
 from icub_jump_env.robot.kinematics import build_pinocchio_model
 from icub_jump_env.simulation.ground_truth import GroundTruth
 from icub_jump_env.simulation.physics import Physics
+from icub_jump_env.simulation.sensor_models import SensorConfig
 from icub_jump_env.simulation.sensors import Sensors
 
 zeros = np.zeros(facts.N_JOINTS)
@@ -56,7 +57,12 @@ def test_ground_truth_against_pinocchio(physics, seed):
     ]
     # The box is 8 mm thick; upside down its top corners are the lowest.
     assert min(corners) - 0.0081 <= state.sole_height <= min(corners) + 1e-9
+    middle = np.array([facts.SOLE.center_x, 0.0, facts.SOLE.bottom + 0.004])
+    for foot, frame in enumerate(facts.SOLE_FRAMES):
+        center = data.oMf[model.getFrameId(frame)].act(middle)
+        np.testing.assert_allclose(state.sole_position[foot], center, atol=1e-9)
     up = data.oMf[model.getFrameId("chest")].rotation @ [0, 1, 0]
+    np.testing.assert_allclose(state.chest_up, up, atol=1e-9)
     assert state.chest_tilt == pytest.approx(np.arccos(up[2]))
 
 
@@ -79,7 +85,7 @@ def test_positive_base_pitch_leans_forward(physics):
     assert GroundTruth(physics).read().base_pitch == pytest.approx(0.2, abs=1e-3)
     head, base = (physics.data.body(name).xpos[0] for name in ("head", facts.BASE_LINK))
     assert head > base
-    sensors = Sensors(physics)
+    sensors = Sensors(physics, SensorConfig())
     sensors.read()
     # Leaning forward, gravity points towards the front of the base.
     np.testing.assert_allclose(sensors.gravity, [np.sin(0.2), 0, -np.cos(0.2)], atol=1e-3)
@@ -90,7 +96,7 @@ def test_gyro_is_in_the_forward_facing_frame(physics):
     # MuJoCo's angular velocity is in the frame of root_link, which faces backwards.
     physics.data.qvel[3:6] = [0.1, 0.2, 0.3]
     mujoco.mj_forward(physics.model, physics.data)
-    sensors = Sensors(physics)
+    sensors = Sensors(physics, SensorConfig())
     sensors.read()
     np.testing.assert_allclose(sensors.gyro, [-0.1, -0.2, 0.3], atol=1e-9)
 

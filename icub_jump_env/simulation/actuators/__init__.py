@@ -1,0 +1,1 @@
+"""From joint commands to joint torques: servo or torque loop, motor, friction."""

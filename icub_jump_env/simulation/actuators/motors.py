@@ -1,0 +1,112 @@
+"""Motors: how much torque there is at which speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.checks import check_choice, check_number
+from icub_jump_env.robot import facts
+
+Array = NDArray[np.float64]
+
+
+class Motor(Protocol):
+    """Limits torques to what the motors can give."""
+
+    def limit(self, torque: Array, joint_velocity: Array) -> None:
+        """Clip (23,) joint-side motor torques (Nm) in place, at (23,) rad/s."""
+        ...
+
+
+@dataclass(frozen=True)
+class RatedMotor:
+    """Full torque up to the speed limit, beyond which it fades out: the ideal motor.
+
+    Attributes:
+        speed_band: Over this share of the speed limit, above it, the available torque
+            falls to zero.
+        kind: Name of this model.
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+
+    speed_band: float = facts.SPEED_TOLERANCE
+    kind: Literal["rated"] = "rated"
+
+    def __post_init__(self) -> None:
+        check_choice("kind", self.kind, ("rated",))
+        check_number("speed_band", self.speed_band, 1e-3, 1.0)
+
+    def make(self, strength: Array) -> Motor:
+        """The motors; ``strength`` is the (23,) share of torque that they give."""
+        slope = 1.0 / (self.speed_band * facts.VELOCITY_LIMIT)
+        return _TorqueSpeedLine(
+            effort=facts.EFFORT_LIMIT * strength,
+            stall=facts.EFFORT_LIMIT * strength * (1.0 + 1.0 / self.speed_band),
+            droop=facts.EFFORT_LIMIT * strength * slope,
+        )
+
+
+@dataclass(frozen=True)
+class DCMotor:
+    """Torque limited by the current, and by the voltage that the back-EMF leaves.
+
+    With winding resistance R, torque constant k and gear ratio N the voltage limit is a
+    line, tau = (N k / R)(V - N k s_dot), given here by its two ends. The paper set both
+    limits "to the maximum value"; that is 1 here.
+
+    Attributes:
+        current_limit: Largest current as a share of the one that gives the effort limit.
+        voltage_limit: Share of the full voltage.
+        stall_torque: Torque at rest at the full voltage without a current limit, in
+            effort limits. Assumption.
+        no_load_speed: Speed without torque at the full voltage, in speed limits.
+            Assumption; with both defaults the line leaves the effort limit at 0.94 of
+            the speed limit and gives 0.8 of it at the speed limit.
+        kind: Name of this model.
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+
+    current_limit: float = 1.0
+    voltage_limit: float = 1.0
+    stall_torque: float = 4.0
+    no_load_speed: float = 1.25
+    kind: Literal["dc"] = "dc"
+
+    def __post_init__(self) -> None:
+        check_choice("kind", self.kind, ("dc",))
+        check_number("current_limit", self.current_limit, 0.01, 1.0)
+        check_number("voltage_limit", self.voltage_limit, 0.01, 1.0)
+        check_number("stall_torque", self.stall_torque, 1.0, 100.0)
+        check_number("no_load_speed", self.no_load_speed, 0.1, 10.0)
+
+    def make(self, strength: Array) -> Motor:
+        """The motors; ``strength`` is the (23,) share of torque that they give."""
+        effort = facts.EFFORT_LIMIT * strength
+        stall = self.stall_torque * effort
+        return _TorqueSpeedLine(
+            effort=self.current_limit * effort,
+            stall=self.voltage_limit * stall,
+            droop=stall / (self.no_load_speed * facts.VELOCITY_LIMIT),
+        )
+
+
+class _TorqueSpeedLine:
+    """|torque| within the effort, and below a line that falls with the speed."""
+
+    def __init__(self, effort: Array, stall: Array, droop: Array) -> None:
+        self._effort, self._stall, self._droop = effort, stall, droop
+
+    def limit(self, torque: Array, joint_velocity: Array) -> None:
+        braking = self._droop * joint_velocity
+        np.minimum(torque, self._stall - braking, out=torque)
+        np.maximum(torque, -self._stall - braking, out=torque)
+        np.minimum(torque, self._effort, out=torque)
+        np.maximum(torque, -self._effort, out=torque)

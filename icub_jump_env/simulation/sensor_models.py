@@ -1,0 +1,135 @@
+"""How wrong the sensors are."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.checks import check_count, check_number, check_type
+
+Array = NDArray[np.float64]
+
+SensorName = Literal["ideal", "realistic"]
+
+
+@dataclass(frozen=True)
+class SensorError:
+    """Error of one kind of reading, in the reading's unit.
+
+    Attributes:
+        noise: Standard deviation of white Gaussian noise, drawn at each reading.
+        bias: Largest constant offset; drawn uniformly in +- at each reset.
+        drift: Largest rate (1/s) at which the offset grows from the reset on; drawn
+            uniformly in +- at each reset.
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+
+    noise: float = 0.0
+    bias: float = 0.0
+    drift: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("noise", "bias", "drift"):
+            check_number(name, getattr(self, name), 0.0, 1e4)
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """Errors of all sensors.
+
+    Attributes:
+        joint_position: Encoders (rad). The servos read encoders with this bias, too.
+        joint_velocity: Encoders (rad/s).
+        tilt: Direction of gravity from the IMU (rad about each of its axes).
+        gyro: Angular velocity from the IMU (rad/s).
+        force: Force under a foot, each axis (N).
+        moment: Moment about the middle of a sole, each axis (Nm).
+        force_gain: Largest calibration error of the forces under a foot, as a share;
+            drawn uniformly in +- per foot at each reset.
+        delay: Age of all readings in control ticks.
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+
+    joint_position: SensorError = field(default_factory=SensorError)
+    joint_velocity: SensorError = field(default_factory=SensorError)
+    tilt: SensorError = field(default_factory=SensorError)
+    gyro: SensorError = field(default_factory=SensorError)
+    force: SensorError = field(default_factory=SensorError)
+    moment: SensorError = field(default_factory=SensorError)
+    force_gain: float = 0.0
+    delay: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ERROR_KINDS:
+            check_type(name, getattr(self, name), SensorError)
+        check_number("force_gain", self.force_gain, 0.0, 1.0)
+        check_count("delay", self.delay, 0)
+
+    def with_noise_of(self, other: SensorConfig, share: float) -> SensorConfig:
+        """The same with a ``share`` of another configuration's noise on top (variances add)."""
+        if share == 0.0:
+            return self
+        noisier = {}
+        for name in ERROR_KINDS:
+            own, added = getattr(self, name), share * getattr(other, name).noise
+            noisier[name] = dataclasses.replace(own, noise=math.hypot(own.noise, added))
+        return dataclasses.replace(self, **noisier)
+
+
+ERROR_KINDS = ("joint_position", "joint_velocity", "tilt", "gyro", "force", "moment")
+"""The readings that have a :class:`SensorError`."""
+
+_ENCODER_STEP = 2 * math.pi / 4096
+"""The iCub's absolute joint encoders (AEA boards) resolve 12 bit per turn."""
+
+SENSORS: Mapping[SensorName, SensorConfig] = MappingProxyType(
+    {
+        "ideal": SensorConfig(),
+        "realistic": SensorConfig(
+            # Standard deviation of rounding to one step; calibrated to 0.2 deg (assumption).
+            joint_position=SensorError(noise=_ENCODER_STEP / math.sqrt(12), bias=0.0035),
+            # Assumption: filtered differences of the encoder.
+            joint_velocity=SensorError(noise=0.05),
+            # Assumptions: an attitude filter good to 0.5 deg, a MEMS gyroscope.
+            tilt=SensorError(noise=0.009, bias=0.009),
+            gyro=SensorError(noise=0.05, bias=0.01, drift=0.001),
+            # Assumptions. Andrade Chavez, Traversaro and Pucci (Sensors 19(24):5521, 2019)
+            # describe how the iCub's force/torque sensors lose their calibration once
+            # mounted and drift with temperature.
+            force=SensorError(noise=1.0, bias=10.0, drift=2.0),
+            moment=SensorError(noise=0.05, bias=0.5, drift=0.1),
+            force_gain=0.05,
+            delay=1,
+        ),
+    }
+)
+"""Sensor errors by name."""
+
+
+class ErrorSource:
+    """Draws the errors of one kind of reading."""
+
+    def __init__(self, error: SensorError, size: int, rng: np.random.Generator) -> None:
+        """Draw bias and drift of ``size`` channels."""
+        self._noise = error.noise
+        self._rng = rng
+        self.bias: Array = error.bias * rng.uniform(-1.0, 1.0, size)
+        self._drift: Array = error.drift * rng.uniform(-1.0, 1.0, size)
+
+    def at(self, time: float) -> Array:
+        """Errors of one reading at ``time`` (s) since the reset."""
+        error: Array = self.bias + self._drift * time
+        if self._noise > 0.0:
+            error += self._noise * self._rng.standard_normal(error.size)
+        return error

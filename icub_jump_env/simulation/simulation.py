@@ -1,0 +1,132 @@
+"""The robot in its world: commands in, readings out, the true state beside them."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.control.command import JointCommand
+from icub_jump_env.simulation.actuators.actuators import Actuators
+from icub_jump_env.simulation.actuators.config import ActuatorConfig
+from icub_jump_env.simulation.ground_truth import GroundTruth
+from icub_jump_env.simulation.physics import Physics
+from icub_jump_env.simulation.randomization import Randomization, World, draw_world
+from icub_jump_env.simulation.sensor_models import SensorConfig
+from icub_jump_env.simulation.sensors import Sensors
+from icub_jump_env.simulation.variation import ModelVariation
+
+Array = NDArray[np.float64]
+
+SETTLING_TIME = 0.3
+"""Time (s) that a reset lets the soles settle into the floor before the jump starts."""
+
+PUSH_DURATION = 0.05
+"""How long the force of a push acts (s)."""
+
+
+class Simulation:
+    """Physics with actuators, sensors and whatever of it varies between episodes.
+
+    Attributes:
+        physics: The MuJoCo world.
+        truth: Its true state.
+        sensors: What the controllers may know of it.
+        actuators: What turns their commands into torques.
+        world: What was drawn for the present episode.
+    """
+
+    def __init__(
+        self,
+        physics: Physics,
+        actuators: ActuatorConfig,
+        sensors: SensorConfig,
+        randomization: Randomization,
+        command_delay: int,
+    ) -> None:
+        """Set up the simulation.
+
+        Args:
+            physics: The MuJoCo world.
+            actuators: Models of the actuators.
+            sensors: Errors of the sensors.
+            randomization: What varies.
+            command_delay: Control ticks until a command takes effect, beside those drawn.
+        """
+        self.physics = physics
+        self.truth = GroundTruth(physics)
+        self.sensors = Sensors(physics, sensors)
+        self._actuator_config = actuators
+        self._dt = float(physics.model.opt.timestep)
+        self.actuators = Actuators(actuators, self._dt)
+        self._randomization = randomization
+        self._variation = ModelVariation(physics.model)
+        self._command_delay = command_delay
+        self._pending: deque[JointCommand] = deque()
+        self._push = _NO_PUSH
+        self.world: World
+
+    def reset(
+        self,
+        rng: np.random.Generator,
+        qpos: Array,
+        torque: Array,
+        launch_duration: float,
+    ) -> None:
+        """Draw a world and let the robot settle in it, at rest at time zero.
+
+        Args:
+            rng: Where all randomness comes from.
+            qpos: (30,) MuJoCo positions to start from.
+            torque: (23,) joint torques that hold them (Nm).
+            launch_duration: In which the push has to fit (s).
+        """
+        physics = self.physics
+        self.world = world = draw_world(self._randomization, physics.model.nbody - 1, rng)
+        if self._randomization.varies:
+            self._variation.apply(world, physics.model)
+            self.actuators = Actuators(
+                self._actuator_config, self._dt, world.strength, world.joint_gain
+            )
+        self.sensors.reset(world, seed=int(rng.integers(2**63)))
+        physics.reset(qpos)
+        self.actuators.reset(qpos[7:], torque)
+        self._push = _NO_PUSH
+        for _ in range(round(SETTLING_TIME / self._dt)):
+            self.step()
+        physics.start_from_rest()
+        self._pending.clear()
+        if world.push != 0.0:
+            start = world.push_time * (launch_duration - PUSH_DURATION)
+            self._push = start, start + PUSH_DURATION, world.push / PUSH_DURATION
+
+    def command(self, command: JointCommand) -> None:
+        """Send a command on its way; call once per control tick."""
+        delay = self._command_delay + self.world.delay
+        if delay == 0:
+            self.actuators.command(command)
+            return
+        self._pending.append(command.copy())
+        if len(self._pending) > delay:
+            self.actuators.command(self._pending.popleft())
+
+    def step(self) -> None:
+        """Advance by one physics step."""
+        physics = self.physics
+        position = physics.joint_position
+        if self.sensors.biased:
+            position = position + self.sensors.encoder_bias
+        torque = self.actuators.torque(position, physics.joint_velocity)
+        start, end, force = self._push
+        pushing = start <= physics.data.time < end
+        physics.step(torque, force if pushing else 0.0)
+
+    def sense(self) -> None:
+        """Take new readings; call once per control tick."""
+        self.sensors.read()
+        self.actuators.torque_error[:] = self.sensors.torque_error
+
+
+_NO_PUSH = (np.inf, np.inf, 0.0)
+"""Start (s), end (s) and force (N)."""

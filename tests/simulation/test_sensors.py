@@ -1,0 +1,197 @@
+"""Sensor errors: what was asked for is what is measured."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.robot import facts
+from icub_jump_env.simulation.physics import Physics
+from icub_jump_env.simulation.randomization import Randomization, draw_world
+from icub_jump_env.simulation.sensor_models import (
+    ERROR_KINDS,
+    SENSORS,
+    SensorConfig,
+    SensorError,
+)
+from icub_jump_env.simulation.sensors import Sensors
+
+NOMINAL = draw_world(Randomization(), 1, np.random.default_rng(0))
+zeros = np.zeros(facts.N_JOINTS)
+
+
+@pytest.fixture(scope="module")
+def physics():
+    physics = Physics(0.001)
+    physics.reset(np.concatenate(([0, 0, 0.6, 0, 0, 0, 1], facts.CROUCH)))
+    physics.step(zeros)
+    return physics
+
+
+def sensors(physics, seed=0, world=NOMINAL, **config) -> Sensors:
+    made = Sensors(physics, SensorConfig(**config))
+    made.reset(world, seed)
+    return made
+
+
+def readings(made):
+    made.read()
+    names = ("joint_position", "joint_velocity", "gravity", "gyro", "foot_force")
+    return {name: getattr(made, name).copy() for name in names}
+
+
+READING = {"joint_position": "joint_position", "joint_velocity": "joint_velocity",
+           "tilt": "gravity", "gyro": "gyro", "force": "foot_force", "moment": None}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ERROR_KINDS)
+def test_an_error_shows_in_its_reading_alone(physics, kind):
+    truth = readings(sensors(physics))
+    wrong = readings(sensors(physics, **{kind: SensorError(noise=0.1)}))
+    for name, reading in truth.items():
+        assert np.array_equal(reading, wrong[name]) == (name != READING[kind])
+
+
+def test_noise_has_the_standard_deviation_asked_for(physics):
+    made = sensors(physics, joint_velocity=SensorError(noise=0.3))
+    samples = np.array([readings(made)["joint_velocity"] for _ in range(500)])
+    errors = samples - physics.joint_velocity
+    assert errors.std() == pytest.approx(0.3, rel=0.03)
+    assert abs(errors.mean()) < 0.02
+    white = np.corrcoef(errors[:-1].ravel(), errors[1:].ravel())[0, 1]
+    assert abs(white) < 0.03
+
+
+def test_bias_is_constant_within_an_episode_and_uniform_over_episodes(physics):
+    made = sensors(physics, gyro=SensorError(bias=0.2))
+    drawn = []
+    for seed in range(300):
+        made.reset(NOMINAL, seed)
+        first, second = readings(made)["gyro"], readings(made)["gyro"]
+        np.testing.assert_array_equal(first, second)
+        drawn.append(first - physics.data.sensor("base_gyro").data)
+    drawn = np.array(drawn)
+    assert np.abs(drawn).max() <= 0.2
+    assert drawn.std() == pytest.approx(0.2 / math.sqrt(3), rel=0.1)
+
+
+def test_drift_grows_linearly(physics):
+    made = sensors(physics, force=SensorError(drift=4.0))
+    offsets, start = [], physics.data.time
+    for time in (0.0, 1.0, 2.0):
+        physics.data.time = time
+        offsets.append(readings(made)["foot_force"])
+    physics.data.time = start
+    np.testing.assert_allclose(offsets[0], 0.0)
+    np.testing.assert_allclose(offsets[2], 2 * offsets[1])
+    assert (np.abs(offsets[1]) > 0).all()
+    assert (np.abs(offsets[1]) <= 4.0).all()
+
+
+def test_delay_shows_the_past():
+    physics = Physics(0.001)
+    physics.reset(np.concatenate(([0, 0, 0.6, 0, 0, 0, 1], facts.CROUCH)))
+    delayed, present = sensors(physics, delay=3), sensors(physics)
+    now = []
+    for tick in range(10):
+        physics.step(zeros)
+        now.append(readings(present))
+        late = readings(delayed)
+        for name, reading in late.items():
+            np.testing.assert_array_equal(reading, now[max(0, tick - 3)][name])
+    assert not np.array_equal(now[0]["joint_velocity"], now[3]["joint_velocity"])
+
+
+def test_gravity_stays_a_unit_vector_tilted_by_the_error(physics):
+    truth = readings(sensors(physics))["gravity"]
+    made = sensors(physics, tilt=SensorError(bias=0.02))
+    wrong = readings(made)["gravity"]
+    assert np.linalg.norm(wrong) == pytest.approx(1.0)
+    assert 0.001 < np.arccos(truth @ wrong) < 0.02 * math.sqrt(3)
+
+
+def test_wrench_errors_reach_the_torques_through_the_transposed_jacobian(physics):
+    """The power of the wrench error equals that of the torque error, joint by joint."""
+    made = sensors(physics, force=SensorError(bias=10.0), moment=SensorError(bias=1.0))
+    made.read()
+    force, moment = (made._errors[kind].bias.reshape(2, 3) for kind in ("force", "moment"))
+    expected = np.zeros(facts.N_JOINTS)
+    moved, eps = Physics(0.001), 1e-6
+    for joint in range(facts.N_JOINTS):
+        velocity, omega = sole_motion(moved, physics.data.qpos, joint, eps)
+        expected[joint] = -np.sum(force * velocity) - np.sum(moment * omega)
+    np.testing.assert_allclose(made.torque_error, expected, atol=1e-4)
+    assert np.abs(made.torque_error).max() > 1.0
+
+
+def sole_motion(physics, qpos, joint, eps):
+    """Velocities (2, 3) and angular velocities (2, 3) of the soles per joint velocity."""
+    positions, rotations = [], []
+    for step in (-eps, eps):
+        target = qpos.copy()
+        target[7 + joint] += step
+        physics.reset(target)
+        soles = [physics.data.geom(f"{side}_sole_contact") for side in "lr"]
+        positions.append(np.array([sole.xpos for sole in soles]))
+        rotations.append(np.array([sole.xmat.reshape(3, 3) for sole in soles]))
+    spin = (rotations[1] - rotations[0]) / (2 * eps) @ rotations[0].transpose(0, 2, 1)
+    omega = np.stack((spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]), axis=1)
+    return (positions[1] - positions[0]) / (2 * eps), omega
+
+
+def test_force_gain_scales_the_force():
+    physics = Physics(0.001)
+    physics.reset(np.concatenate(([0, 0, 0.47, 0, 0, 0, 1], facts.CROUCH)))
+    for _ in range(200):
+        physics.step(zeros)
+        if physics.data.sensor("floor_force").data[3] > 50:
+            break
+    truth = readings(sensors(physics))["foot_force"]
+    made = sensors(physics, force_gain=0.1)
+    wrong = readings(made)["foot_force"]
+    np.testing.assert_allclose(wrong, truth * (1 + made._force_gain))
+    assert made.torque_error.any()
+    assert (np.abs(made._force_gain) <= 0.1).all()
+
+
+def test_same_seed_same_errors_and_another_seed_others(physics):
+    made = Sensors(physics, SENSORS["realistic"])
+    series = []
+    for seed in (3, 4, 3):
+        made.reset(NOMINAL, seed)
+        series.append([readings(made) for _ in range(4)])
+    for a, b, c in zip(*series, strict=True):
+        for name in a:
+            np.testing.assert_array_equal(a[name], c[name])
+        assert not np.array_equal(a["joint_velocity"], b["joint_velocity"])
+
+
+def test_a_pickled_copy_continues_with_the_same_errors(physics):
+    made = Sensors(physics, SENSORS["realistic"])
+    made.reset(NOMINAL, 5)
+    readings(made)
+    copy = pickle.loads(pickle.dumps(made))
+    for _ in range(3):
+        ours, theirs = readings(made), readings(copy)
+        for name in ours:
+            np.testing.assert_array_equal(ours[name], theirs[name])
+
+
+def test_noise_on_top_adds_variances():
+    base = SensorConfig(gyro=SensorError(noise=3.0, bias=1.0))
+    both = base.with_noise_of(SensorConfig(gyro=SensorError(noise=8.0, drift=9.0)), 0.5)
+    assert both.gyro == SensorError(noise=5.0, bias=1.0)
+    assert base.with_noise_of(SENSORS["realistic"], 0.0) == base
+
+
+@pytest.mark.parametrize(
+    "values", [{"tilt": 0.1}, {"force_gain": -0.1}, {"delay": 1.5}, {"delay": -1}]
+)
+def test_bad_configurations_are_refused(values):
+    with pytest.raises(ConfigError) as refusal:
+        SensorConfig(**values)
+    assert refusal.value.field in values
+    with pytest.raises(ConfigError, match="noise"):
+        SensorError(noise=-1.0)
