@@ -229,15 +229,16 @@ UNSHIFTED_CROUCH = posture(
 """The same with the ankle range as it came: CoM at 0.43 m, so less room to accelerate."""
 
 LANDING = posture(
-    hip_pitch=54.7,
+    hip_pitch=56.4,
     knee=-76.0,
-    ankle_pitch=-31.3,
+    ankle_pitch=-34.5,
     torso_pitch=5.0,
     shoulder_pitch=-17.2,
     shoulder_roll=14.3,
     elbow=45.8,
 )
-"""Posture of flight and landing: feet retracted, stable at touch-down (section III-C)."""
+"""Posture of flight and landing: feet retracted, stable at touch-down (section III-C). The
+CoM is over the middle of the soles, as far from the heels as from the toes."""
 
 
 def crouch(ankle_shift: bool = True) -> NDArray[np.float64]:

@@ -111,6 +111,13 @@ def test_crouch_com_is_above_the_soles():
     assert kinematics.com[2] == pytest.approx(0.39, abs=0.005)
 
 
+def test_landing_com_is_over_the_middle_of_the_soles():
+    """Falls were backward while the CoM was 2 cm behind it."""
+    kinematics = FeetFixedKinematics()
+    kinematics.update(facts.LANDING)
+    assert kinematics.com[0] == pytest.approx(facts.SOLE.center_x, abs=0.006)
+
+
 def test_structure_for_users_of_the_mujoco_model(model):
     assert model.body(1).name == facts.BASE_LINK
     assert model.jnt_bodyid[0] == 1
