@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from icub_jump_env.control.phases import ContactThresholds
 from icub_jump_env.control.torque import TorqueGains
 from icub_jump_env.control.velocity import VelocityGains
 from icub_jump_env.evaluation import cli
-from icub_jump_env.simulation.actuators import ServoGains
+from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.simulation import tables
+from icub_jump_env.simulation.actuators.servo import ServoGains
 
 REPOSITORY = Path(__file__).parents[1]
 DOCUMENTS = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
@@ -28,7 +31,8 @@ def test_regenerating_changes_only_the_blocks(document):
     text = document.read_text()
 
     def output(command):
-        return "| new |" if "observation" in command else "first\n\nlast, new"
+        table = "observation" in command or "tables" in command
+        return "| new |" if table else "first\n\nlast, new"
 
     once = update.updated(text, output)
     assert update.updated(once, output) == once
@@ -41,6 +45,12 @@ def test_the_observation_table_is_current():
     assert observation.layout_table() in document
 
 
+def test_the_preset_tables_are_current():
+    document = (REPOSITORY / "docs" / "simulation.md").read_text()
+    for kind in tables.PRESETS:
+        assert tables.preset_table(kind) in document
+
+
 def test_the_readme_shows_the_table_once():
     readme = (REPOSITORY / "README.md").read_text()
     assert readme.count("flight height (CoM), cm") == 1
@@ -49,9 +59,9 @@ def test_the_readme_shows_the_table_once():
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
 def test_every_command_of_eval_parses(document):
     for line in re.findall(r"python eval\.py([^#`\n]*)", document.read_text()):
-        arguments = line.split(" -->")[0].split()
+        arguments = shlex.split(line.split(" -->")[0])
         if arguments != ["--help"]:
-            cli.parse(cli.EvalOptions, arguments)
+            cli.parse(EvalOptions, arguments)
 
 
 def test_the_controller_page_states_the_gains_in_use():

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
+import json
 import re
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar, get_args
 
 import tyro
 from rich.console import Console
 
-from icub_jump_env.checks import check_count
-from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ICubJumpError
+from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.opengl import import_mujoco
 
 T = TypeVar("T")
@@ -25,31 +25,36 @@ USAGE_ERROR = 2
 INTERRUPTED = 130
 
 
-@dataclass(frozen=True)
-class EvalOptions:
-    """Evaluate the jump and compare it with the paper.
+_registry = tyro.constructors.ConstructorRegistry()
 
-    Runs the jump with and without the momentum constraint and prints the table.
 
-    Attributes:
-        config: The jump; every field of the environment's configuration is a flag.
-        episodes: Episodes of each arm. Nothing is random so far: all come out alike.
-        seed: Seed of the first episode; the next ones count up.
-        json: Write everything to this file.
-        plot: Draw the figures 1, 2 (torque controller: 3) and 6 into this folder.
-        video: Record the jump to this file, such as jump.mp4 (extra 'video').
-    """
+@_registry.primitive_rule
+def _name_or_json(
+    info: tyro.constructors.PrimitiveTypeInfo,
+) -> tyro.constructors.PrimitiveConstructorSpec[Any] | None:
+    """Models are given by name, or by their fields as JSON."""
+    options = get_args(info.type)
+    if len(options) != 2 or not dataclasses.is_dataclass(options[1]):
+        return None
+    names = get_args(options[0])
 
-    config: Annotated[JumpConfig, tyro.conf.arg(name="")] = field(default_factory=JumpConfig)
-    episodes: int = 1
-    seed: int = 0
-    json: Path | None = None
-    plot: Path | None = None
-    video: Path | None = None
+    def from_words(words: list[str]) -> Any:
+        if words[0] in names:
+            return words[0]
+        try:
+            return json.loads(words[0])
+        except json.JSONDecodeError:
+            raise ValueError(f"{words[0]} is none of {', '.join(names)}, nor JSON") from None
 
-    def __post_init__(self) -> None:
-        check_count("episodes", self.episodes, 1)
-        check_count("seed", self.seed, 0)
+    return tyro.constructors.PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=f"{{{','.join(names)}}}|JSON",
+        instance_from_str=from_words,
+        is_instance=lambda value: isinstance(value, str | options[1]),
+        str_from_instance=lambda value: [
+            value if isinstance(value, str) else json.dumps(dataclasses.asdict(value))
+        ],
+    )
 
 
 def parse(kind: type[T], arguments: Sequence[str]) -> T:
@@ -61,7 +66,7 @@ def parse(kind: type[T], arguments: Sequence[str]) -> T:
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            return tyro.cli(kind, args=list(arguments))
+            return tyro.cli(kind, args=list(arguments), registry=_registry)
     except SystemExit as end:
         if end.code in (0, None):
             raise
@@ -86,50 +91,47 @@ def evaluate(arguments: Sequence[str]) -> None:
 
 def _evaluate(options: EvalOptions) -> None:
     import_mujoco()
-    # Imported here so that --help and bad arguments answer at once.
-    from icub_jump_env.evaluation.nominal import nominal_report, run_nominal
-    from icub_jump_env.evaluation.output import check_writable, write_json
-    from icub_jump_env.evaluation.table import comparison_rows, render_table, verdict
+    # Imported here, like the modes, so that --help and bad arguments answer at once.
+    from icub_jump_env.evaluation.output import check_writable
 
-    momentum_control = options.config.momentum_control
-    for name, path in (("json", options.json), ("video", options.video)):
+    for name in ("json", "video"):
+        path = getattr(options, name)
         if path is not None:
             check_writable(name, path)
-    if options.plot is not None:
-        check_writable("plot", options.plot, folder=True)
-    if options.video is not None:
+    for name in ("plot", "report"):
+        path = getattr(options, name)
+        if path is not None:
+            check_writable(name, path, folder=True)
+    if options.video is not None or options.report is not None:
         from icub_jump_env.evaluation.video import check_video, record_video
 
-        check_video(options.video)
+        check_video(options.video or Path("jump.mp4"))
 
     console, progress = Console(), Console(stderr=True)
-    arms = run_nominal(
-        options.config,
-        options.episodes,
-        options.seed,
-        trace=options.plot is not None,
-        console=progress,
-    )
-    controller = options.config.controller
-    rows = comparison_rows(options.config, arms[0].episodes, arms[1].episodes)
-    title = (
-        f"{options.config.jump_height * 100:g} cm jump, {controller} controller; "
-        "the paper's: 4 cm after 11 cm"
-    )
-    console.print(render_table(rows, title, momentum_control))
-    console.print(verdict(rows, momentum_control))
-    if options.json is not None:
-        write_json(options.json, nominal_report(arms, options.seed))
-        console.print(f"wrote {options.json}")
-    if options.plot is not None:
-        from icub_jump_env.evaluation.figures import draw_figures
-
-        episodes = {arm.name: arm.episodes[0] for arm in arms}
-        for file in draw_figures(options.plot, options.config, episodes):
-            console.print(f"wrote {file}")
+    _run_mode(options, console, progress)
     if options.video is not None:
         record_video(options.video, options.config, options.seed, progress)
         console.print(f"wrote {options.video}")
+
+
+def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None:
+    match options.mode:
+        case "statistics":
+            from icub_jump_env.evaluation.statistics import run_statistics
+
+            run_statistics(options, console, progress)
+        case "study":
+            from icub_jump_env.evaluation.study import run_study
+
+            run_study(options, console, progress)
+        case "sweep":
+            from icub_jump_env.evaluation.sweep import run_sweep
+
+            run_sweep(options, console, progress)
+        case _:
+            from icub_jump_env.evaluation.nominal import print_nominal
+
+            print_nominal(options, console, progress)
 
 
 def _one_line(complaint: str) -> str:

@@ -1,7 +1,8 @@
-"""The paper's figures 1, 2 or 3, and 6, redrawn from our simulation."""
+"""The paper's figures 1, 2 or 3, 4 and 6, redrawn from our simulation."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from icub_jump_env.config import ControllerName, JumpConfig
-from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
 from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
 from icub_jump_env.robot import facts
 from icub_jump_env.snapshot import Snapshot
@@ -22,13 +23,16 @@ MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"
 Trace = Sequence[Snapshot]
 
 
-def draw_figures(folder: Path, config: JumpConfig, episodes: Mapping[str, Episode]) -> list[Path]:
+def draw_figures(
+    folder: Path, config: JumpConfig, episodes: Mapping[str, Episode], seed: int
+) -> list[Path]:
     """Write the figures as PNG files.
 
     Args:
         folder: Where to write them; made if missing.
         config: The jump's configuration.
         episodes: Traced episodes ``with`` and ``without`` the momentum constraint.
+        seed: Seed of the episode with realistic actuators and sensors.
 
     Returns:
         The files written.
@@ -36,10 +40,13 @@ def draw_figures(folder: Path, config: JumpConfig, episodes: Mapping[str, Episod
     folder.mkdir(parents=True, exist_ok=True)
     ours = episodes["with" if config.momentum_control else "without"]
     figure_number = _LAUNCH[config.controller].figure.lower().replace(". ", "")
+    robot = realistic(config)
+    robot_episode = run_episode(make_env(traced(robot)), seed, trace=True)
     files = []
     for name, figure in (
         ("fig1_com_reference", com_reference_figure(config)),
         (f"{figure_number}_launch", launch_figure(config, ours.trace)),
+        ("fig4_realistic", robot_figure(robot, robot_episode.trace)),
         ("fig6_base_pitch", base_pitch_figure(episodes)),
     ):
         file = folder / f"{name}.png"
@@ -86,11 +93,45 @@ _LAUNCH: dict[ControllerName, _Shown] = {
 def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
     """Fig. 2 (joint velocities) or Fig. 3 (joint torques) and CoM height, desired and measured."""
     shown = _LAUNCH[config.controller]
+    figure, (*joints, height) = _figure(1, 4, (13.0, 3.4))
+    _draw_joints(joints, config, trace)
+    _draw_height(height, config, trace)
     duration = _trajectory(config).duration
+    figure.suptitle(
+        f"{shown.figure}: {config.controller} approach, take-off commanded at {duration:.2f} s"
+    )
+    return figure
+
+
+def realistic(config: JumpConfig) -> JumpConfig:
+    """The jump of Fig. 4: as on the real robot, which jumped with the velocity approach."""
+    return dataclasses.replace(
+        config, controller="velocity", actuators="realistic", sensors="realistic",
+        control_frequency=None,
+    )  # fmt: skip
+
+
+def robot_figure(config: JumpConfig, trace: Trace) -> Figure:
+    """Fig. 4: the jump of the real robot, here simulated with realistic actuators and sensors.
+
+    As in the paper the CoM is the one estimated from the encoders as if the feet stood
+    still, which means nothing after take-off; the true one is drawn beside it.
+    """
+    figure, (*joints, height) = _figure(1, 4, (13.0, 3.4))
+    _draw_joints(joints, config, trace)
+    _draw_height(height, config, trace, estimated=True)
+    figure.suptitle(
+        "Fig. 4: simulation with realistic actuators and sensors, velocity approach "
+        "(the paper shows the real robot)"
+    )
+    return figure
+
+
+def _draw_joints(axes: Sequence[Axes], config: JumpConfig, trace: Trace) -> None:
+    shown = _LAUNCH[config.controller]
     time = np.array([s.time for s in trace])
-    figure, axes = _figure(1, 4, (13.0, 3.4))
-    launch = time <= duration
-    for axis, joint in zip(axes, ("ankle_pitch", "knee", "hip_pitch"), strict=False):
+    launch = time <= _trajectory(config).duration
+    for axis, joint in zip(axes, ("ankle_pitch", "knee", "hip_pitch"), strict=True):
         index = facts.JOINT_INDEX[f"l_{joint}"]
         measured = np.array([getattr(s, shown.quantity)[index] for s in trace])
         # A snapshot holds the command that led to it, issued one control period before.
@@ -106,20 +147,23 @@ def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
         _label(axis, f"left {joint.replace('_', ' ')}", shown.unit)
     axes[0].legend(frameon=False)
 
-    height = axes[3]
-    end = duration + 0.6
-    early = time <= end
-    com = np.array([s.com[2] for s in trace])
-    reference = np.array([s.com_reference[2] for s in trace])
-    height.plot(time[early], com[early], color=MEASURED)
-    height.plot(time[early], reference[early], color=DESIRED, ls="--")
-    height.axvline(duration, color=ACCENT, lw=0.8, ls=":")
-    height.annotate("T", (duration, com.min()), color=ACCENT, ha="left")
-    _label(height, "CoM height", "m")
-    figure.suptitle(
-        f"{shown.figure}: {config.controller} approach, take-off commanded at {duration:.2f} s"
-    )
-    return figure
+
+def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool = False) -> None:
+    duration = _trajectory(config).duration
+    early = [s for s in trace if s.time <= duration + 0.6]
+    time = [s.time for s in early]
+    true = [s.com[2] for s in early]
+    if estimated:
+        axis.plot(time, [s.com_estimate[2] for s in early], color=MEASURED, label="estimated")
+        axis.plot(time, true, color=ACCENT, label="true")
+    else:
+        axis.plot(time, true, color=MEASURED)
+    axis.plot(time, [s.com_reference[2] for s in early], color=DESIRED, ls="--")
+    axis.axvline(duration, color=ACCENT, lw=0.8, ls=":")
+    axis.annotate("T", (duration, min(true)), color=ACCENT, ha="left")
+    _label(axis, "CoM height", "m")
+    if estimated:
+        axis.legend(frameon=False)
 
 
 def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:

@@ -10,18 +10,19 @@ from typing import Any
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.output import progress_display
-from icub_jump_env.evaluation.provenance import provenance
+from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.evaluation.output import progress_display, write_json
+from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
-from icub_jump_env.evaluation.table import comparison_rows
+from icub_jump_env.evaluation.table import comparison_rows, render_table, verdict
 
 
 @dataclass(frozen=True)
 class Arm:
-    """Episodes of one configuration."""
+    """The jump with one setting of the momentum constraint."""
 
     config: JumpConfig
-    episodes: tuple[Episode, ...]
+    episode: Episode
 
     @property
     def name(self) -> str:
@@ -29,15 +30,12 @@ class Arm:
         return "with" if self.config.momentum_control else "without"
 
 
-def run_nominal(
-    config: JumpConfig, episodes: int, seed: int, trace: bool, console: Console
-) -> tuple[Arm, Arm]:
+def run_nominal(config: JumpConfig, seed: int, trace: bool, console: Console) -> tuple[Arm, Arm]:
     """Jump as configured, and with the momentum constraint switched over.
 
     Args:
         config: The jump.
-        episodes: Episodes of each arm, seeded ``seed``, ``seed + 1``, ...
-        seed: First seed.
+        seed: Seed of both.
         trace: Whether the episodes carry snapshots.
         console: Where the progress is shown.
 
@@ -45,18 +43,38 @@ def run_nominal(
         The arm as configured and the other one.
     """
     with progress_display(console) as progress:
-        task = progress.add_task("jumping", total=2 * episodes)
+        task = progress.add_task("jumping", total=2)
         arms = []
         for momentum_control in (config.momentum_control, not config.momentum_control):
             arm_config = dataclasses.replace(config, momentum_control=momentum_control)
             env = make_env(traced(arm_config) if trace else arm_config)
-            done = []
-            for index in range(episodes):
-                done.append(run_episode(env, seed + index, trace))
-                progress.advance(task)
+            arms.append(Arm(arm_config, run_episode(env, seed, trace)))
             env.close()
-            arms.append(Arm(arm_config, tuple(done)))
+            progress.advance(task)
     return arms[0], arms[1]
+
+
+def print_nominal(options: EvalOptions, console: Console, progress: Console) -> None:
+    """Run eval.py without a mode."""
+    config = options.config
+    arms = run_nominal(config, options.seed, trace=options.plot is not None, console=progress)
+    ours, other = (arm.episode for arm in arms)
+    rows = comparison_rows(config, ours, other)
+    title = (
+        f"{config.jump_height * 100:g} cm jump, {config.controller} controller; "
+        "the paper's: 4 cm after 11 cm"
+    )
+    console.print(render_table(rows, title, config.momentum_control))
+    console.print(verdict(rows, config.momentum_control))
+    if options.json is not None:
+        write_json(options.json, nominal_report(arms, options.seed))
+        console.print(f"wrote {options.json}")
+    if options.plot is not None:
+        from icub_jump_env.evaluation.figures import draw_figures
+
+        episodes = {arm.name: arm.episode for arm in arms}
+        for file in draw_figures(options.plot, config, episodes, options.seed):
+            console.print(f"wrote {file}")
 
 
 def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
@@ -64,24 +82,20 @@ def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
     ours, other = arms
     return {
         "mode": "nominal",
+        "command": command(),
         **provenance(ours.config, seed),
         "arms": {
             arm.name: {
                 "momentum_control": arm.config.momentum_control,
-                "episodes": [
-                    {
-                        "seed": episode.seed,
-                        "outcome": episode.outcome,
-                        "is_success": episode.is_success,
-                        "jump": episode.jump,
-                    }
-                    for episode in arm.episodes
-                ],
+                "outcome": arm.episode.outcome,
+                "is_success": arm.episode.is_success,
+                "failure": arm.episode.failure,
+                "jump": arm.episode.jump,
             }
             for arm in arms
         },
         "comparison": [
             dataclasses.asdict(row)
-            for row in comparison_rows(ours.config, ours.episodes, other.episodes)
+            for row in comparison_rows(ours.config, ours.episode, other.episode)
         ],
     }

@@ -44,21 +44,30 @@ def check_writable(field: str, path: Path, folder: bool = False) -> None:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write strict JSON atomically; NaN, which JSON lacks, becomes null.
+    """Write strict JSON as :func:`write_file` does; NaN, which JSON lacks, becomes null."""
+    write_file(path, (strict_json(content, indent=2) + "\n").encode())
+
+
+def strict_json(content: Any, indent: int | None = None) -> str:
+    """``content`` as JSON, with null for NaN."""
+    return json.dumps(_without_nan(content), indent=indent, allow_nan=False)
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file atomically.
 
     An existing file stays as it is unless the new one is complete. Links are followed;
     a device such as ``/dev/stdout`` is written to.
     """
-    text = json.dumps(_without_nan(content), indent=2, allow_nan=False)
     path = path.resolve()
     if path.exists() and not path.is_file():
-        path.write_text(text + "\n")
+        path.write_bytes(content)
         return
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     temporary = Path(name)
     try:
-        with os.fdopen(descriptor, "w") as file:
-            file.write(text + "\n")
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         temporary.chmod(0o644)

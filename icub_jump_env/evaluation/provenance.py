@@ -15,7 +15,7 @@ _PACKAGES = ("daqp", "gymnasium", "icub-models", "mujoco", "numpy", "osqp", "pin
 
 
 def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
-    """Versions, configuration, seed and command of a result."""
+    """Versions, configuration and seed of a result."""
     return {
         "versions": {
             "icub-jump": icub_jump_env.__version__,
@@ -24,5 +24,9 @@ def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
         },
         "config": dataclasses.asdict(config),
         "seed": seed,
-        "command": ["python", *sys.argv],
     }
+
+
+def command() -> list[str]:
+    """The command that runs."""
+    return ["python", *sys.argv]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
+from icub_jump_env.evaluation.failures import Failure, failure_of
 from icub_jump_env.snapshot import Snapshot
 
 Frame = NDArray[np.uint8]
@@ -26,6 +27,8 @@ class Episode:
         outcome: ``stood``, ``fell``, ``no take-off`` or ``diverged``.
         is_success: Whether it counts as a success.
         jump: Metrics by name, SI units.
+        failure: Class of the failure, if it was one.
+        world: What was drawn at the reset.
         trace: Snapshots at the control rate, if asked for.
     """
 
@@ -33,6 +36,8 @@ class Episode:
     outcome: str
     is_success: bool
     jump: dict[str, Any]
+    failure: Failure | None = None
+    world: dict[str, Any] = field(default_factory=dict)
     trace: tuple[Snapshot, ...] = ()
 
 
@@ -66,6 +71,7 @@ def run_episode(
     zero = np.zeros(3, dtype=np.float32)
     snapshots = []
     _, info = env.reset(seed=seed)
+    world = info["world"]
     terminated = False
     while True:
         if trace:
@@ -75,4 +81,6 @@ def run_episode(
         if terminated:
             break
         _, _, terminated, _, info = env.step(zero)
-    return Episode(seed, info["outcome"], info["is_success"], info["jump"], tuple(snapshots))
+    outcome, jump = info["outcome"], info["jump"]
+    failure = failure_of(outcome, jump, info["jump_height"])
+    return Episode(seed, outcome, info["is_success"], jump, failure, world, tuple(snapshots))

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from rich import box
 from rich.table import Table
 
@@ -24,9 +23,9 @@ class Row:
         quantity: What it is.
         unit: Unit of the numbers.
         paper: The paper's value, if it gives one.
-        ours: Median over our episodes as configured.
+        ours: Ours as configured.
         difference: Ours minus the paper's.
-        switched: Median over our episodes with the momentum constraint switched over.
+        switched: Ours with the momentum constraint switched over.
         source: Where the paper's value comes from.
     """
 
@@ -39,45 +38,39 @@ class Row:
     source: str
 
 
-_CM, _DEG = 100.0, math.degrees(1.0)
+CM, DEG = 100.0, math.degrees(1.0)
 
-_QUANTITIES = (
-    ("flight height (CoM)", "flight_height", "cm", _CM, "simulation"),
-    ("sole height", "sole_height", "cm", _CM, "simulation"),
+QUANTITIES = (
+    ("flight height (CoM)", "flight_height", "cm", CM, "simulation"),
+    ("sole height", "sole_height", "cm", CM, "simulation"),
     ("take-off velocity", "takeoff_velocity", "m/s", 1.0, "command"),
     ("take-off time", "takeoff_time", "s", 1.0, "command"),
-    ("ballistic height", "ballistic_height", "cm", _CM, "real robot"),
-    ("rotation in flight", "flight_rotation", "deg", _DEG, ""),
-    ("base pitch in flight", "base_pitch_range", "deg", _DEG, "Fig. 6"),
+    ("ballistic height", "ballistic_height", "cm", CM, "real robot"),
+    ("rotation in flight", "flight_rotation", "deg", DEG, ""),
+    ("base pitch in flight", "base_pitch_range", "deg", DEG, "Fig. 6"),
     ("limit violations", "limit_violations", "steps", 1.0, ""),
     ("landed and stands", "landed", "%", 100.0, "simulation"),
 )
 """Quantity, metric and attribute of the paper's result, unit, scale, the paper's source."""
 
 
-def comparison_rows(
-    config: JumpConfig, ours: Sequence[Episode], switched: Sequence[Episode]
-) -> list[Row]:
+def comparison_rows(config: JumpConfig, ours: Episode, switched: Episode) -> list[Row]:
     """The rows of the table.
 
     Args:
         config: Our configuration. There is a difference to the paper only where it is the
             paper's jump.
-        ours: Episodes as configured.
-        switched: Episodes with the momentum constraint switched over.
+        ours: The episode as configured.
+        switched: The episode with the momentum constraint switched over.
 
     Returns:
-        One row per quantity: medians, and a mean for the share that landed.
+        One row per quantity.
     """
     rows = []
     same_jump = _plan(config) == _plan(JumpConfig())
-    for quantity, key, unit, scale, source in _QUANTITIES:
+    for quantity, key, unit, scale, source in QUANTITIES:
         paper = getattr(PAPER[config.controller], key, None)
-        reduce = np.mean if key == "landed" else np.median
-        value, other = (
-            scale * float(reduce([float(episode.jump[key]) for episode in episodes]))
-            for episodes in (ours, switched)
-        )
+        value, other = (scale * float(episode.jump[key]) for episode in (ours, switched))
         reference = None if paper is None else scale * paper
         difference = None if reference is None or not same_jump else value - reference
         rows.append(Row(quantity, unit, reference, value, difference, other, source))
@@ -109,7 +102,7 @@ def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Tab
         )
     table.caption = (
         "paper: simulated heights and landing, commanded take-off, ballistic height of the real "
-        "robot; eq. 3d: the momentum constraint; medians over the episodes"
+        "robot; eq. 3d: the momentum constraint"
     )
     table.caption_justify = "left"
     return table
@@ -118,10 +111,9 @@ def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Tab
 def verdict(rows: Sequence[Row], momentum_control: bool) -> str:
     """Which arm of the ablation stands, in a sentence."""
     row = next(row for row in rows if row.quantity.startswith("landed"))
-    stands = {100.0: "stands", 0.0: "falls"}
     with_, without = (
-        stands.get(share, f"stands in {share:.0f} % of the episodes")
-        for share in ((row.ours, row.switched) if momentum_control else (row.switched, row.ours))
+        "stands" if landed else "falls"
+        for landed in ((row.ours, row.switched) if momentum_control else (row.switched, row.ours))
     )
     return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
 

@@ -1,0 +1,79 @@
+"""What eval.py can be asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from icub_jump_env.checks import check_count
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
+
+STUDY_EPISODES = 20
+"""Episodes of each case of a study, where errors and noise are drawn anew."""
+
+
+@dataclass(frozen=True)
+class EvalOptions:
+    """Evaluate the jump.
+
+    Without further options: the jump with and without the momentum constraint, beside
+    the paper's numbers. With randomization or several episodes: success and landing
+    rates, metrics and failures.
+
+    Attributes:
+        config: The jump; every field of the environment's configuration is a flag.
+        episodes: Number of episodes; in a study, of each case (default 20).
+        seed: Seed of the first episode; the next ones count up.
+        jobs: Processes that work in parallel (more than 1 needs the extra 'parallel').
+        study: How the realism of actuators and sensors changes the jump.
+        sweep: Desired height against displacement, for both controllers.
+        report: Write one self-contained HTML page into this folder (extra 'video').
+        view: Show the jump live, in the browser or in a window.
+        results: Where an evaluation of several episodes keeps them as they come; by
+            default a file in results/.
+        resume: Finish an interrupted evaluation.
+        json: Write everything to this file.
+        plot: Draw the figures into this folder.
+        video: Record the jump to this file, such as jump.mp4 (extra 'video').
+
+    Raises:
+        ConfigError: If a value is out of range or options exclude each other.
+    """
+
+    config: Annotated[JumpConfig, tyro.conf.arg(name="")] = field(default_factory=JumpConfig)
+    episodes: int | None = None
+    seed: int = 0
+    jobs: int = 1
+    study: Literal["realism"] | None = None
+    sweep: bool = False
+    report: Path | None = None
+    view: bool = False
+    results: Path | None = None
+    resume: bool = False
+    json: Path | None = None
+    plot: Path | None = None
+    video: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.episodes is not None:
+            check_count("episodes", self.episodes, 1)
+        check_count("seed", self.seed, 0)
+        check_count("jobs", self.jobs, 1)
+        chosen = [mode for mode in ("study", "sweep", "report", "view") if getattr(self, mode)]
+        if len(chosen) > 1:
+            raise ConfigError(chosen[0], True, f"not together with {' and '.join(chosen[1:])}")
+        if self.mode != "statistics" and (self.resume or self.results is not None):
+            raise ConfigError("resume", True, "only in an evaluation of several episodes")
+
+    @property
+    def mode(self) -> str:
+        """Which of eval.py's modes is meant."""
+        for mode in ("study", "sweep", "report", "view"):
+            if getattr(self, mode):
+                return mode
+        several = self.episodes is not None and self.episodes > 1
+        return "statistics" if several or self.config.randomization_config.varies else "nominal"

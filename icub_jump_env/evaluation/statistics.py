@@ -1,0 +1,192 @@
+"""Many episodes: how often the jump succeeds, how well, and why it fails."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from scipy.stats import binomtest
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.failures import Failure
+from icub_jump_env.evaluation.log import EpisodeLog
+from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.evaluation.output import progress_display, strict_json, write_json
+from icub_jump_env.evaluation.parallel import run_jobs
+from icub_jump_env.evaluation.provenance import command, provenance
+from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.table import QUANTITIES
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share of episodes with its Wilson interval."""
+
+    count: int
+    total: int
+
+    @property
+    def share(self) -> float:
+        """Observed share."""
+        return self.count / self.total
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson interval of 95 %."""
+        interval = binomtest(self.count, self.total).proportion_ci(CONFIDENCE, method="wilson")
+        return float(interval.low), float(interval.high)
+
+    def __str__(self) -> str:
+        low, high = self.interval
+        return (
+            f"{100 * self.share:.1f} % ({self.count} of {self.total}; "
+            f"95 % interval {100 * low:.1f} to {100 * high:.1f} %)"
+        )
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a set of episodes says.
+
+    Attributes:
+        success: At least 0.7 of the commanded height, and landed.
+        landed: Landed and stands.
+        percentiles: 10th, 50th and 90th percentile of each metric, SI units, over the
+            episodes where it is defined; NaN if there is none.
+        failures: Seeds of the failed episodes by class.
+    """
+
+    success: Rate
+    landed: Rate
+    percentiles: Mapping[str, tuple[float, float, float]]
+    failures: Mapping[Failure, tuple[int, ...]]
+
+    @classmethod
+    def of(cls, episodes: Sequence[Episode]) -> Statistics:
+        """Statistics of some episodes, in any order."""
+        total = len(episodes)
+        failures = {
+            kind: tuple(sorted(e.seed for e in episodes if e.failure is kind)) for kind in Failure
+        }
+        percentiles = {}
+        for _, metric, *_ in QUANTITIES:
+            values = np.array([float(e.jump[metric]) for e in episodes])
+            values = values[~np.isnan(values)]
+            p10, p50, p90 = np.percentile(values, [10, 50, 90]) if values.size else [np.nan] * 3
+            percentiles[metric] = (float(p10), float(p50), float(p90))
+        return cls(
+            success=Rate(sum(e.is_success for e in episodes), total),
+            landed=Rate(sum(bool(e.jump["landed"]) for e in episodes), total),
+            percentiles=percentiles,
+            failures={kind: seeds for kind, seeds in failures.items() if seeds},
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            name: {"count": rate.count, "total": rate.total, "interval": rate.interval}
+            for name, rate in (("success", self.success), ("landed", self.landed))
+        } | {"percentiles": self.percentiles, "failures": self.failures}
+
+
+def run_statistics(options: EvalOptions, console: Console, progress: Console) -> list[Episode]:
+    """Run eval.py with several episodes or a randomised world; print and return them."""
+    config, episodes = options.config, options.episodes or 1
+    log = EpisodeLog(
+        options.results or default_log(config, options.seed, episodes),
+        {"episodes": episodes, **provenance(config, options.seed)},
+        options.resume,
+    )
+    seeds = range(options.seed, options.seed + episodes)
+    missing = [seed for seed in seeds if seed not in log.episodes]
+    with progress_display(progress) as display:
+        task = display.add_task("jumping", total=episodes, completed=episodes - len(missing))
+        try:
+            for _, episode in run_jobs([(config, seed) for seed in missing], options.jobs):
+                log.append(episode)
+                display.advance(task)
+        except KeyboardInterrupt:
+            kept = f"{len(log.episodes)} of {episodes} episodes are in {log.path}"
+            progress.print(f"{kept}; add --resume to the command to finish", soft_wrap=True)
+            raise
+    log.finish()
+    done = [log.episodes[seed] for seed in seeds]
+    statistics = Statistics.of(done)
+    for renderable in render(statistics, options):
+        console.print(renderable, soft_wrap=isinstance(renderable, str), markup=False)
+    progress.print(f"wrote {log.path}", soft_wrap=True)
+    if options.json is not None:
+        asked = {"mode": "statistics", "command": command(), "episodes": episodes}
+        write_json(
+            options.json,
+            asked | provenance(config, options.seed) | statistics.as_dict(),
+        )
+    return done
+
+
+def default_log(config: JumpConfig, seed: int, episodes: int) -> Path:
+    """Where the episodes of an evaluation go: readable, and another file for another one."""
+    asked = strict_json([dataclasses.asdict(config), seed, episodes])
+    digest = hashlib.sha256(asked.encode()).hexdigest()[:8]
+    ranges = config.randomization if isinstance(config.randomization, str) else "custom"
+    height = f"{100 * config.jump_height:g}cm"
+    return Path("results") / f"{config.controller}-{height}-{ranges}-{digest}.jsonl"
+
+
+def render(statistics: Statistics, options: EvalOptions) -> list[Table | str]:
+    """What the terminal shows."""
+    config = options.config
+    ranges = config.randomization if isinstance(config.randomization, str) else "custom"
+    title = (
+        f"{100 * config.jump_height:g} cm jump, {config.controller} controller, "
+        f"randomization {ranges}, seeds {options.seed} to "
+        f"{options.seed + statistics.landed.total - 1}"
+    )
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for column in ("10 %", "median", "90 %"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name, metric, unit, scale, _ in QUANTITIES:
+        if metric != "landed":
+            values = (f"{scale * value:.3g}" for value in statistics.percentiles[metric])
+            table.add_row(f"{name}, {unit}", *values)
+    lines = [f"landed and stands: {statistics.landed}", f"success: {statistics.success}"]
+    for kind, seeds in statistics.failures.items():
+        shown = ", ".join(map(str, seeds[:10])) + (", ..." if len(seeds) > 10 else "")
+        lines.append(f"{kind}: {len(seeds)} (seeds {shown})")
+    if statistics.failures:
+        seed = next(iter(statistics.failures.values()))[0]
+        lines.append(f"replay one: python eval.py {replay_arguments(config, seed)} --view")
+    return [title, table, "\n".join(lines)]
+
+
+def replay_arguments(config: JumpConfig, seed: int) -> str:
+    """Arguments of eval.py that play one episode again."""
+    words = []
+    for field in dataclasses.fields(config):
+        value = getattr(config, field.name)
+        if value == field.default:
+            continue
+        flag = field.name.replace("_", "-")
+        if isinstance(value, bool):
+            words.append(f"--{flag}" if value else f"--no-{flag}")
+            continue
+        words.append(f"--{flag}")
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            words.append(strict_json(dataclasses.asdict(value)))
+        elif isinstance(value, tuple):
+            words += map(str, value)
+        else:
+            words.append(str(value))
+    return shlex.join([*words, "--seed", str(seed)])

@@ -1,0 +1,217 @@
+"""The realism study: one imperfection after the other, for both controllers.
+
+The paper names three reasons why its torque controller did not jump on the real robot:
+computation time, the tuning of the low-level torque control, and errors of the torques
+estimated from force/torque sensors. Each is switched on here by itself.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from icub_jump_env.config import ControllerName, JumpConfig
+from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
+from icub_jump_env.evaluation.output import progress_display, write_json
+from icub_jump_env.evaluation.parallel import run_jobs
+from icub_jump_env.evaluation.provenance import command, provenance
+from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.statistics import Statistics
+from icub_jump_env.evaluation.table import DEG
+from icub_jump_env.simulation.actuators.config import ACTUATORS
+from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
+from icub_jump_env.simulation.sensor_models import SensorConfig, SensorError
+
+CONTROLLERS: tuple[ControllerName, ...] = get_args(ControllerName)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One imperfection.
+
+    Attributes:
+        group: What it belongs to.
+        label: What is changed in it.
+        changes: Fields of the configuration that make it.
+    """
+
+    group: str
+    label: str
+    changes: dict[str, Any]
+
+
+def cases() -> list[Case]:
+    """All cases of the study."""
+    feedback = ACTUATORS["torque_feedback"]
+    delays = [
+        Case("computation time", _ticks(ticks), {"command_delay": ticks}) for ticks in range(4)
+    ]
+    loops = [
+        Case("low-level torque control", "ideal", {"actuators": "ideal"}),
+        *(
+            Case(
+                "low-level torque control",
+                f"feedback, {bandwidth:g} Hz",
+                {
+                    "actuators": dataclasses.replace(
+                        feedback, torque_loop=TorqueFeedback(bandwidth=bandwidth)
+                    )
+                },
+            )
+            for bandwidth in (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5)
+        ),
+        Case("low-level torque control", "current control", {"actuators": "current_control"}),
+    ]
+    # Errors of the feet's sensors reach the joints through the torque feedback. A moment
+    # of 1 Nm goes with a force of 20 N, as in the realistic preset.
+    sensors = [
+        ("no error", SensorConfig()),
+        *(
+            (
+                f"offset {force:g} N",
+                SensorConfig(force=SensorError(bias=force), moment=SensorError(bias=force / 20.0)),
+            )
+            for force in (10.0, 20.0, 40.0, 80.0)
+        ),
+        *(
+            (
+                f"drift {rate:g} N/s",
+                SensorConfig(force=SensorError(drift=rate), moment=SensorError(drift=rate / 20.0)),
+            )
+            for rate in (20.0, 80.0)
+        ),
+        *((f"calibration {gain:.0%}", SensorConfig(force_gain=gain)) for gain in (0.05, 0.1, 0.2)),
+    ]
+    errors = [
+        Case("force/torque sensors", label, {"actuators": "torque_feedback", "sensors": config})
+        for label, config in sensors
+    ]
+    motors = [
+        Case("motors", "rated", {"actuators": "ideal"}),
+        Case("motors", "DC, limits raised", {"actuators": "dc_motor"}),
+        Case("motors", "DC, original limits", {"actuators": "original_limits"}),
+    ]
+    realistic = ACTUATORS["realistic"]
+    current = dataclasses.replace(realistic, torque_loop=ACTUATORS["current_control"].torque_loop)
+    together = [
+        Case("all together", label, {"actuators": actuators, "sensors": "realistic"} | delay)
+        for delay, words in (({}, ""), ({"command_delay": 2}, ", 2 ticks"))
+        for label, actuators in (
+            (f"torque feedback{words}", realistic),
+            (f"current control{words}", current),
+        )
+    ]
+    return [*delays, *loops, *errors, *motors, *together]
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """Outcome of a case by controller."""
+
+    case: Case
+    statistics: dict[ControllerName, Statistics]
+
+
+def run_study(options: EvalOptions, console: Console, progress: Console) -> None:
+    """Run ``eval.py --study realism``."""
+    results = run_cases(options, progress)
+    console.print(render(results, options))
+    if options.json is not None:
+        write_json(options.json, study_report(results, options))
+        console.print(f"wrote {options.json}")
+    if options.plot is not None:
+        from icub_jump_env.evaluation.study_figure import realism_figure
+
+        options.plot.mkdir(parents=True, exist_ok=True)
+        file = options.plot / "realism.png"
+        realism_figure(results).savefig(file)
+        console.print(f"wrote {file}")
+
+
+def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
+    """Run every case with both controllers."""
+    all_cases = cases()
+    work, owners = [], []
+    for index, case in enumerate(all_cases):
+        for controller in CONTROLLERS:
+            config = dataclasses.replace(options.config, controller=controller, **case.changes)
+            for seed in _seeds(config, options):
+                work.append((config, seed))
+                owners.append((index, controller))
+    episodes: dict[tuple[int, ControllerName], list[Episode]] = {o: [] for o in owners}
+    with progress_display(progress) as display:
+        task = display.add_task("jumping", total=len(work))
+        for index, episode in run_jobs(work, options.jobs):
+            episodes[owners[index]].append(episode)
+            display.advance(task)
+    return [
+        CaseResult(case, {c: Statistics.of(episodes[index, c]) for c in CONTROLLERS})
+        for index, case in enumerate(all_cases)
+    ]
+
+
+def _seeds(config: JumpConfig, options: EvalOptions) -> range:
+    """One episode is enough where nothing is random."""
+    random = config.sensor_config != SensorConfig() or config.randomization_config.varies
+    episodes = (options.episodes or STUDY_EPISODES) if random else 1
+    return range(options.seed, options.seed + episodes)
+
+
+def render(results: Sequence[CaseResult], options: EvalOptions) -> Table:
+    """The table for the terminal."""
+    table = Table(
+        title=f"Realism study, {options.config.jump_height * 100:g} cm jump",
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    table.add_column("", no_wrap=True)
+    for controller in CONTROLLERS:
+        for quantity in ("rise", "rot.", "landed"):
+            table.add_column(f"{controller[:3]}.\n{quantity}", justify="right", no_wrap=True)
+    group = ""
+    for result in results:
+        if result.case.group != group:
+            group = result.case.group
+            table.add_section()
+            table.add_row(f"[bold]{group}[/bold]")
+        cells = [cell for c in CONTROLLERS for cell in _cells(result.statistics[c])]
+        table.add_row(f"  {result.case.label}", *cells)
+    table.caption = (
+        "vel., tor.: velocity and torque controller; rise of the CoM in cm and rotation in "
+        "flight in deg: medians; landed: share in %"
+    )
+    table.caption_justify = "left"
+    return table
+
+
+def _cells(statistics: Statistics) -> tuple[str, str, str]:
+    rise = statistics.percentiles["flight_height"][1]
+    rotation = statistics.percentiles["flight_rotation"][1]
+    return f"{100 * rise:.2f}", f"{DEG * rotation:.1f}", f"{100 * statistics.landed.share:.0f}"
+
+
+def study_report(results: Sequence[CaseResult], options: EvalOptions) -> dict[str, Any]:
+    """Everything the study found, for ``--json``."""
+    return {
+        "mode": "study",
+        "command": command(),
+        **provenance(options.config, options.seed),
+        "cases": [
+            {
+                **dataclasses.asdict(result.case),
+                **{c: result.statistics[c].as_dict() for c in CONTROLLERS},
+            }
+            for result in results
+        ],
+    }
+
+
+def _ticks(ticks: int) -> str:
+    return f"delay of {ticks} control tick{'' if ticks == 1 else 's'}"

@@ -1,0 +1,220 @@
+"""Rates, percentiles, the log on disk, resuming, replaying."""
+
+import json
+import math
+import shlex
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation import cli, statistics
+from icub_jump_env.evaluation.failures import Failure
+from icub_jump_env.evaluation.log import EpisodeLog
+from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
+from icub_jump_env.evaluation.statistics import Rate, Statistics, replay_arguments
+from icub_jump_env.metrics.jump import JumpMetrics
+from icub_jump_env.simulation.randomization import Randomization
+
+FAST = ["--randomization", "full", "--stand-time", "0.0"]
+
+
+@pytest.mark.parametrize(("count", "total"), [(0, 10), (7, 10), (200, 200), (190, 200)])
+def test_wilson_interval_against_its_definition(count, total):
+    """The shares p with |p_observed - p| <= z sqrt(p (1 - p) / n)."""
+    low, high = Rate(count, total).interval
+    z, observed = norm.ppf(0.975), count / total
+    for bound in (low, high):
+        if 0.0 < bound < 1.0:
+            assert (observed - bound) ** 2 == pytest.approx(z**2 * bound * (1 - bound) / total)
+    assert low <= observed <= high
+
+
+def episode(seed, failure=None, **jump):
+    metrics = JumpMetrics().as_dict() | {"landed": failure is None} | jump
+    outcome = "stood" if failure is None else "fell"
+    return Episode(seed, outcome, failure is None, metrics, failure, {"friction": 0.5})
+
+
+class TestStatistics:
+    def test_rates_percentiles_and_failures(self):
+        heights = np.linspace(0.03, 0.05, 21)
+        episodes = [episode(seed, flight_height=h) for seed, h in enumerate(heights)]
+        episodes[3] = episode(3, Failure.TOO_LOW, flight_height=heights[3], landed=True)
+        episodes[8] = episode(8, Failure.FELL_BACKWARD, flight_height=heights[8])
+        found = Statistics.of(episodes)
+        assert (found.landed.count, found.success.count) == (20, 19)
+        assert found.percentiles["flight_height"] == pytest.approx((0.032, 0.04, 0.048))
+        assert found.failures == {Failure.TOO_LOW: (3,), Failure.FELL_BACKWARD: (8,)}
+        assert Statistics.of(episodes[::-1]) == found
+
+    def test_undefined_metrics_are_left_out(self):
+        episodes = [episode(0, flight_rotation=0.1), episode(1, Failure.NO_TAKEOFF)]
+        found = Statistics.of(episodes)
+        assert found.percentiles["flight_rotation"] == pytest.approx((0.1, 0.1, 0.1))
+        assert all(math.isnan(value) for value in found.percentiles["base_pitch_range"])
+
+
+class TestLog:
+    header = {"config": {"jump_height": 0.04, "solver": "daqp"}, "episodes": 3}  # noqa: RUF012
+
+    def test_episodes_survive_the_disk(self, tmp_path):
+        written = [episode(0, flight_height=0.1 + 0.2), episode(1, Failure.SLIPPED)]
+        log = EpisodeLog(tmp_path / "new" / "log.jsonl", self.header, resume=False)
+        for e in written:
+            log.append(e)
+        again = EpisodeLog(log.path, self.header, resume=True)
+        assert list(again.episodes.values()) == written
+        assert again.episodes[1].failure is Failure.SLIPPED
+        assert isinstance(again.episodes[0].jump["angular_momentum_takeoff"], tuple)
+
+    def test_a_line_cut_off_is_dropped(self, tmp_path):
+        log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
+        log.append(episode(0))
+        with log.path.open("a") as file:
+            file.write('{"seed": 1, "outc')
+        again = EpisodeLog(log.path, self.header, resume=True)
+        assert set(again.episodes) == {0}
+        again.append(episode(1))
+        assert set(EpisodeLog(log.path, self.header, resume=True).episodes) == {0, 1}
+
+    def test_finished_logs_do_not_depend_on_the_order(self, tmp_path):
+        contents = []
+        for order in ((0, 1, 2), (2, 0, 1)):
+            log = EpisodeLog(tmp_path / f"{order[0]}.jsonl", self.header, resume=False)
+            for seed in order:
+                log.append(episode(seed))
+            log.finish()
+            contents.append(log.path.read_bytes())
+        assert contents[0] == contents[1]
+
+    def test_an_existing_log_is_kept(self, tmp_path):
+        path = tmp_path / "log.jsonl"
+        for seed in range(3):
+            EpisodeLog(path, self.header, resume=False).append(episode(seed))
+        assert set(EpisodeLog(path, self.header, resume=True).episodes) == {2}
+        for seed in range(2):
+            kept = EpisodeLog(tmp_path / f"log.{seed + 1}.jsonl", self.header, resume=True)
+            assert set(kept.episodes) == {seed}
+
+    def test_another_question_is_refused_by_name(self, tmp_path):
+        path = tmp_path / "log.jsonl"
+        EpisodeLog(path, self.header, resume=False).append(episode(0))
+        before = path.read_bytes()
+        other = {"config": {"jump_height": 0.05, "solver": "daqp"}, "episodes": 4}
+        with pytest.raises(ConfigError, match=r"different: config\.jump_height, episodes"):
+            EpisodeLog(path, other, resume=True)
+        assert path.read_bytes() == before
+
+    @pytest.mark.parametrize("content", ["", "nonsense\n", "[1]\n", '{"a": 1}\n{"b": 2}\n'])
+    def test_another_file_is_refused_and_kept(self, tmp_path, content):
+        path = tmp_path / "notes.txt"
+        path.write_text(content)
+        with pytest.raises(ConfigError, match="resume"):
+            EpisodeLog(path, self.header, resume=True)
+        assert path.read_text() == content
+
+
+def evaluate(capsys, *arguments):
+    code = 0
+    try:
+        cli.evaluate([*FAST, *arguments])
+    except SystemExit as end:
+        code = end.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+class TestCommand:
+    def test_prints_rates_metrics_and_failures_and_writes_json(self, capsys, tmp_path):
+        report, log = tmp_path / "r.json", tmp_path / "log.jsonl"
+        code, out, _ = evaluate(
+            capsys, "--episodes", "3", "--seed", "5", "--json", str(report), "--results", str(log)
+        )
+        assert code == 0
+        for words in ("landed and stands: 100.0 % (3 of 3; 95 % interval 43.9 to 100.0 %)",
+                      "success:", "10 %", "median", "flight height", "seeds 5 to 7"):  # fmt: skip
+            assert words in out
+        content = json.loads(report.read_text(), parse_constant=pytest.fail)
+        assert content["landed"]["count"] == 3
+        assert content["config"]["randomization"] == "full"
+        episodes = [json.loads(line) for line in log.read_text().splitlines()[1:]]
+        assert [e["seed"] for e in episodes] == [5, 6, 7]
+        assert len({e["world"]["friction"] for e in episodes}) == 3
+
+    def test_interrupted_and_resumed_equals_uninterrupted(self, capsys, tmp_path, monkeypatch):
+        whole, parts = tmp_path / "whole.jsonl", tmp_path / "parts.jsonl"
+        _, expected, _ = evaluate(capsys, "--episodes", "4", "--results", str(whole))
+
+        run_jobs = statistics.run_jobs
+
+        def interrupted(work, jobs):
+            for number, result in enumerate(run_jobs(work, jobs)):
+                if number == 2:
+                    raise KeyboardInterrupt
+                yield result
+
+        monkeypatch.setattr(statistics, "run_jobs", interrupted)
+        code, out, err = evaluate(capsys, "--episodes", "4", "--results", str(parts))
+        assert code == 130
+        assert out == ""
+        assert f"2 of 4 episodes are in {parts}" in err
+        assert "--resume" in err
+        assert len(parts.read_text().splitlines()) == 3
+
+        asked = []
+
+        def watched(work, jobs):
+            asked.extend(seed for _, seed in work)
+            return run_jobs(work, jobs)
+
+        monkeypatch.setattr(statistics, "run_jobs", watched)
+        code, out, _ = evaluate(capsys, "--episodes", "4", "--results", str(parts), "--resume")
+        assert code == 0
+        assert asked == [2, 3]
+        assert out == expected
+        assert parts.read_bytes() == whole.read_bytes()
+
+    def test_a_finished_evaluation_resumes_to_the_same_table_at_once(self, capsys, monkeypatch):
+        _, expected, _ = evaluate(capsys, "--episodes", "2")
+
+        def nothing_to_do(work, jobs):
+            assert not work
+            return iter(())
+
+        monkeypatch.setattr(statistics, "run_jobs", nothing_to_do)
+        _, out, _ = evaluate(capsys, "--episodes", "2", "--resume")
+        assert out == expected
+
+    def test_failures_can_be_replayed_by_their_seed(self, capsys, tmp_path):
+        """A world in which the jump fails, found by the evaluation and run again alone."""
+        log = tmp_path / "log.jsonl"
+        hopeless = ["--randomization", "full", "--no-momentum-control", "--stand-time", "1"]
+        cli.evaluate([*hopeless, "--episodes", "2", "--results", str(log)])
+        out = capsys.readouterr().out
+        assert "over-rotated: 2 (seeds 0, 1)" in out
+        command = next(line for line in out.splitlines() if "replay" in line).split("eval.py ")[1]
+        options = cli.parse(EvalOptions, shlex.split(command))
+        assert options.view
+        env = make_env(options.config)
+        replayed = run_episode(env, options.seed)
+        header = json.loads(log.read_text().splitlines()[0])
+        recorded = EpisodeLog(log, header, resume=True).episodes[options.seed]
+        assert replayed == recorded
+
+
+def test_replay_arguments_give_the_configuration_back():
+    for config in (
+        JumpConfig(),
+        JumpConfig(
+            controller="torque", momentum_control=False, residual_scale=(0.01, 0.02, 0.03),
+            randomization=Randomization(friction=(0.3, 0.5)), sensors="realistic",
+            control_frequency=250.0, agent_frequency=50.0,
+        ),
+    ):  # fmt: skip
+        options = cli.parse(EvalOptions, shlex.split(replay_arguments(config, 7)))
+        assert options.config == config
+        assert options.seed == 7
