@@ -9,7 +9,6 @@ import json
 import re
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, NoReturn, TypeVar, get_args
 
 import tyro
@@ -98,14 +97,12 @@ def _evaluate(options: EvalOptions) -> None:
         path = getattr(options, name)
         if path is not None:
             check_writable(name, path)
-    for name in ("plot", "report"):
-        path = getattr(options, name)
-        if path is not None:
-            check_writable(name, path, folder=True)
-    if options.video is not None or options.report is not None:
+    if options.plot is not None:
+        check_writable("plot", options.plot, folder=True)
+    if options.video is not None:
         from icub_jump_env.evaluation.video import check_video, record_video
 
-        check_video(options.video or Path("jump.mp4"))
+        check_video(options.video)
 
     console, progress = Console(), Console(stderr=True)
     _run_mode(options, console, progress)
@@ -128,6 +125,12 @@ def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None
             from icub_jump_env.evaluation.sweep import run_sweep
 
             run_sweep(options, console, progress)
+        case "report":
+            from icub_jump_env.evaluation.report import write_report
+
+            assert options.report is not None  # else it were another mode
+            file = write_report(options.report, options.config, options.seed, progress)
+            console.print(f"wrote {file}")
         case _:
             from icub_jump_env.evaluation.nominal import print_nominal
 

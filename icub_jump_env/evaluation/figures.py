@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -10,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from icub_jump_env.config import ControllerName, JumpConfig
+from icub_jump_env.config import CONTROL_RATES, ControllerName, JumpConfig
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
 from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
 from icub_jump_env.robot import facts
@@ -32,7 +34,7 @@ def draw_figures(
         folder: Where to write them; made if missing.
         config: The jump's configuration.
         episodes: Traced episodes ``with`` and ``without`` the momentum constraint.
-        seed: Seed of the episode with realistic actuators and sensors.
+        seed: Their seed.
 
     Returns:
         The files written.
@@ -106,9 +108,12 @@ def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
 def realistic(config: JumpConfig) -> JumpConfig:
     """The jump of Fig. 4: as on the real robot, which jumped with the velocity approach."""
     return dataclasses.replace(
-        config, controller="velocity", actuators="realistic", sensors="realistic",
-        control_frequency=None,
-    )  # fmt: skip
+        config,
+        controller="velocity",
+        actuators="realistic",
+        sensors="realistic",
+        agent_frequency=config.control_frequency or CONTROL_RATES["velocity"],
+    )
 
 
 def robot_figure(config: JumpConfig, trace: Trace) -> Figure:
@@ -136,16 +141,16 @@ def _draw_joints(axes: Sequence[Axes], config: JumpConfig, trace: Trace) -> None
         measured = np.array([getattr(s, shown.quantity)[index] for s in trace])
         # A snapshot holds the command that led to it, issued one control period before.
         desired = np.array([getattr(s, shown.command)[index] for s in trace[1:]])
-        axis.plot(time[launch], measured[launch], color=MEASURED, label="measured")
-        axis.plot(
-            time[:-1][launch[1:]], desired[launch[1:]], color=DESIRED, ls="--", label="desired"
-        )
+        axis.plot(time[launch], measured[launch], color=MEASURED)
+        axis.plot(time[:-1][launch[1:]], desired[launch[1:]], color=DESIRED, ls="--")
         limit = shown.limit[index]
         if float(np.abs(measured[launch]).max()) > 0.8 * limit:
             sign = np.sign(measured[launch][-1])
-            axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":", label="limit")
+            axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":")
         _label(axis, f"left {joint.replace('_', ' ')}", shown.unit)
-    axes[0].legend(frameon=False)
+    styles = (("measured", MEASURED, "-"), ("desired", DESIRED, "--"), ("limit", ACCENT, ":"))
+    handles = [Line2D([], [], color=color, ls=ls, label=label) for label, color, ls in styles]
+    axes[0].legend(handles=handles, frameon=False)
 
 
 def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool = False) -> None:
@@ -169,7 +174,8 @@ def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool =
 def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
     """Fig. 6: base pitch with and without the momentum constraint."""
     figure, (axis,) = _figure(1, 1, (6.5, 3.6))
-    takeoff = min(episode.jump["takeoff_time"] for episode in episodes.values())
+    takeoffs = [episode.jump["takeoff_time"] for episode in episodes.values()]
+    takeoff = min((t for t in takeoffs if not math.isnan(t)), default=math.inf)
     fallen = [e.trace[-1].time for e in episodes.values() if e.outcome == "fell"]
     end = max([takeoff + 0.8, *fallen])
     for name, color, label in (
@@ -189,13 +195,15 @@ def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
                 color=color,
                 ha="right",
             )
-    axis.axvline(takeoff, color=ACCENT, lw=0.8, ls=":")
-    axis.annotate(
-        "take-off", (takeoff, axis.get_ylim()[0]), (4, 4), textcoords="offset points", color=ACCENT
-    )
-    _label(axis, "base pitch (positive: forward)", "deg")
-    axis.legend(frameon=False)
-    figure.suptitle("Fig. 6: base pitch")
+    if math.isfinite(takeoff):
+        axis.axvline(takeoff, color=ACCENT, lw=0.8, ls=":")
+        bottom = axis.get_ylim()[0]
+        axis.annotate(
+            "take-off", (takeoff, bottom), (4, 4), textcoords="offset points", color=ACCENT
+        )
+    _label(axis, "", "deg")
+    axis.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    figure.suptitle("Fig. 6: base pitch (positive: forward)")
     return figure
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.output import progress_display, write_json
 from icub_jump_env.evaluation.provenance import command, provenance
@@ -71,10 +72,19 @@ def print_nominal(options: EvalOptions, console: Console, progress: Console) -> 
         console.print(f"wrote {options.json}")
     if options.plot is not None:
         from icub_jump_env.evaluation.figures import draw_figures
+        from icub_jump_env.evaluation.snapshots import snapshot_strip
 
         episodes = {arm.name: arm.episode for arm in arms}
-        for file in draw_figures(options.plot, config, episodes, options.seed):
-            console.print(f"wrote {file}")
+        files = draw_figures(options.plot, config, episodes, options.seed)
+        try:
+            strip = snapshot_strip(config, options.seed)
+        except MissingDependencyError as error:
+            progress.print(f"left out Fig. 5: {error}", soft_wrap=True)
+        else:
+            files.append(options.plot / "fig5_snapshots.png")
+            strip.savefig(files[-1])
+        for file in files:
+            console.print(f"wrote {file}", soft_wrap=True)
 
 
 def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:

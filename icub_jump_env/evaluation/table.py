@@ -95,10 +95,10 @@ def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Tab
     for row in rows:
         table.add_row(
             f"{row.quantity}, {row.unit}",
-            _number(row.paper),
-            _number(row.ours),
-            _number(row.difference, signed=True),
-            _number(row.switched),
+            number(row.paper),
+            number(row.ours),
+            number(row.difference, signed=True),
+            number(row.switched),
         )
     table.caption = (
         "paper: simulated heights and landing, commanded take-off, ballistic height of the real "
@@ -118,7 +118,8 @@ def verdict(rows: Sequence[Row], momentum_control: bool) -> str:
     return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
 
 
-def _number(value: float | None, signed: bool = False) -> str:
+def number(value: float | None, signed: bool = False) -> str:
+    """A number of the table; a dash where there is none."""
     if value is None or math.isnan(value):
         return "-"
     return f"{value:+.3g}" if signed else f"{value:.3g}"
