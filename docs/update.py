@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -30,7 +31,7 @@ BLOCK = re.compile(
 
 def output_of(command: str) -> str:
     """What the command prints, run in the repository with one BLAS thread."""
-    arguments = [sys.executable, *command.split()[1:]]
+    arguments = [sys.executable, *shlex.split(command)[1:]]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     result = subprocess.run(
         arguments, cwd=REPOSITORY, env=environment, check=True, capture_output=True, text=True

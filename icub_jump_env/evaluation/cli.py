@@ -125,6 +125,10 @@ def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None
             from icub_jump_env.evaluation.sweep import run_sweep
 
             run_sweep(options, console, progress)
+        case "view":
+            from icub_jump_env.evaluation.view import view
+
+            view(options.config, options.seed, console)
         case "report":
             from icub_jump_env.evaluation.report import write_report
 

@@ -28,6 +28,9 @@ from icub_jump_env.simulation.actuators.config import ACTUATORS
 from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
 from icub_jump_env.simulation.sensor_models import SensorConfig, SensorError
 
+_LEVER = 0.05
+"""Moment error (Nm) that goes with a force error of 1 N, as in the realistic preset."""
+
 CONTROLLERS: tuple[ControllerName, ...] = get_args(ControllerName)
 
 
@@ -68,21 +71,18 @@ def cases() -> list[Case]:
         ),
         Case("low-level torque control", "current control", {"actuators": "current_control"}),
     ]
-    # Errors of the feet's sensors reach the joints through the torque feedback. A moment
-    # of 1 Nm goes with a force of 20 N, as in the realistic preset.
+    # Errors of the feet's sensors reach the joints through the torque feedback.
+    worst = _offset(80.0)
     sensors = [
         ("no error", SensorConfig()),
-        *(
-            (
-                f"offset {force:g} N",
-                SensorConfig(force=SensorError(bias=force), moment=SensorError(bias=force / 20.0)),
-            )
-            for force in (10.0, 20.0, 40.0, 80.0)
-        ),
+        *((f"offset {force:g} N", _offset(force)) for force in (10.0, 20.0, 40.0)),
+        ("offset 80 N", worst),
         *(
             (
                 f"drift {rate:g} N/s",
-                SensorConfig(force=SensorError(drift=rate), moment=SensorError(drift=rate / 20.0)),
+                SensorConfig(
+                    force=SensorError(drift=rate), moment=SensorError(drift=_LEVER * rate)
+                ),
             )
             for rate in (20.0, 80.0)
         ),
@@ -92,6 +92,13 @@ def cases() -> list[Case]:
         Case("force/torque sensors", label, {"actuators": "torque_feedback", "sensors": config})
         for label, config in sensors
     ]
+    errors.append(
+        Case(
+            "force/torque sensors",
+            "offset 80 N, current c.",
+            {"actuators": "current_control", "sensors": worst},
+        )
+    )
     motors = [
         Case("motors", "rated", {"actuators": "ideal"}),
         Case("motors", "DC, limits raised", {"actuators": "dc_motor"}),
@@ -211,6 +218,10 @@ def study_report(results: Sequence[CaseResult], options: EvalOptions) -> dict[st
             for result in results
         ],
     }
+
+
+def _offset(force: float) -> SensorConfig:
+    return SensorConfig(force=SensorError(bias=force), moment=SensorError(bias=_LEVER * force))
 
 
 def _ticks(ticks: int) -> str:

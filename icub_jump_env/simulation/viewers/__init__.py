@@ -1,0 +1,1 @@
+"""Screens that show a running simulation: MuJoCo's window, and a page in the browser."""

@@ -1,0 +1,559 @@
+"""The jump shown live: paced as asked, untouched by its viewers, served to this machine alone."""
+
+import contextlib
+import gc
+import io
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import types
+import urllib.request
+import warnings
+
+import mujoco
+import numpy as np
+import psutil
+import pytest
+from rich.console import Console
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.evaluation import view
+from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.view import FRAME, MAX_LAG, Playback, Show
+from icub_jump_env.simulation.opengl import has_display
+from icub_jump_env.simulation.viewers import window
+from icub_jump_env.simulation.viewers.screen import Command, CommandQueue, Stage
+from icub_jump_env.simulation.viewers.window import WindowScreen, check_window
+
+SHORT = JumpConfig(stand_time=0.1)
+PATIENCE = 120.0
+
+
+class Clock:
+    """Stands still except while somebody sleeps."""
+
+    def __init__(self):
+        self.time = 100.0
+
+    def __call__(self):
+        return self.time
+
+    def sleep(self, duration):
+        assert 0.0 < duration <= FRAME
+        self.time += duration
+
+
+class ScriptedScreen:
+    """Remembers what it is given; ``script`` maps what was shown so far to commands."""
+
+    def __init__(self, script):
+        self.script = script
+        self.instants = []
+        self.captions = []
+        self.closed = False
+
+    def show(self, data):
+        self.instants.append(data.time)
+
+    def refresh(self, caption):
+        self.captions.append(caption)
+        return self.script(self)
+
+    def close(self):
+        self.closed = True
+
+
+def quit_at_the_end(screen):
+    return [Command.QUIT] if screen.captions[-1].get("phase") == "stood" else []
+
+
+def show(screen, config=SHORT, **playback):
+    """The episode that this screen showed, and the time (s) that it took."""
+    clock = Clock()
+    env = make_env(traced(config))
+    pace = Playback(clock=clock, **playback)
+    episode = Show(env, 0, screen, pace, threading.Event(), clock, clock.sleep).run()
+    env.close()
+    return episode, clock.time - 100.0
+
+
+@pytest.fixture(scope="module")
+def plain():
+    env = make_env(SHORT)
+    yield run_episode(env, 0)
+    env.close()
+
+
+@pytest.fixture(scope="module")
+def model():
+    """Without meshes, which take their time."""
+    env = make_env(SHORT)
+    yield env.model
+    env.close()
+
+
+# Pace
+
+
+def test_an_instant_is_due_after_its_time_divided_by_the_speed():
+    clock = Clock()
+    playback = Playback(speed=0.25, clock=clock)
+    assert playback.delay(0.0) == 0.0
+    assert playback.delay(0.1) == pytest.approx(0.4)
+    clock.time += 0.3
+    assert playback.instant == pytest.approx(0.075)
+    assert playback.delay(0.1) == pytest.approx(0.1)
+    clock.time += 0.11
+    assert playback.delay(0.1) == 0.0
+
+
+def test_simulated_time_stands_still_in_a_pause():
+    clock = Clock()
+    playback = Playback(speed=0.5, clock=clock)
+    clock.time += 0.2
+    playback.obey(Command.PAUSE)
+    assert playback.paused
+    clock.time += 1000.0
+    assert playback.instant == pytest.approx(0.1)
+    assert playback.delay(0.2) == np.inf
+    playback.obey(Command.PAUSE)
+    assert not playback.paused
+    assert playback.delay(0.2) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("command", "speeds"),
+    [(Command.SLOWER, [1 / 8, 1 / 16, 1 / 32, 1 / 64, 1 / 64]), (Command.FASTER, [1 / 2, 1, 1])],
+)
+def test_the_speed_changes_from_now_on(command, speeds):
+    clock = Clock()
+    playback = Playback(speed=0.25, clock=clock)
+    for speed in speeds:
+        clock.time += 1.0
+        before = playback.instant
+        playback.obey(command)
+        assert playback.speed == speed
+        assert playback.instant == pytest.approx(before)
+        clock.time += 1.0
+        assert playback.instant == pytest.approx(before + speed)
+
+
+def test_a_step_goes_to_the_instant_that_is_waited_for_and_pauses():
+    clock = Clock()
+    playback = Playback(clock=clock)
+    for instant in (0.005, 0.010):
+        assert playback.delay(instant) > 0.0
+        playback.obey(Command.STEP)
+        assert playback.delay(instant) == 0.0
+        assert playback.paused
+    assert playback.delay(0.015) == np.inf
+
+
+def test_a_replay_starts_at_the_beginning_even_from_a_pause():
+    clock = Clock()
+    playback = Playback(paused=True, clock=clock)
+    clock.time += 5.0
+    playback.obey(Command.REPLAY)
+    assert not playback.paused
+    assert playback.instant == 0.0
+
+
+def test_a_small_delay_is_made_up_for_and_a_large_one_is_not():
+    for lag, makes_up in ((0.9 * MAX_LAG, True), (1.1 * MAX_LAG, False)):
+        clock = Clock()
+        playback = Playback(speed=0.25, clock=clock)
+        clock.time += lag
+        assert playback.delay(0.0) == 0.0
+        assert playback.instant == pytest.approx(0.25 * lag if makes_up else 0.0)
+
+
+# Episode
+
+
+@pytest.mark.parametrize("speed", [1 / 8, 1.0])
+def test_the_episode_shown_is_that_of_run_episode_at_the_speed_asked_for(plain, speed):
+    screen = ScriptedScreen(quit_at_the_end)
+    episode, duration = show(screen, speed=speed)
+    assert episode == plain
+    assert np.all(np.diff(screen.instants) > 0.0)
+    assert screen.instants[0] == 0.0
+    assert duration == pytest.approx(screen.instants[-1] / speed, abs=2 * FRAME)
+    assert screen.captions[-1]["time"] == f"{screen.instants[-1]:.3f} s"
+    assert {c["phase"] for c in screen.captions} >= {"launch", "flight", "landing", "stood"}
+
+
+def test_pause_steps_and_replay_do_not_change_the_episode(plain):
+    done = []
+
+    def script(screen):
+        if not done and screen.instants[-1] > 0.3:
+            done.append("paused")
+            return [Command.PAUSE]
+        if done == ["paused"]:
+            if len(screen.captions) % 3:
+                return [Command.STEP]
+            if screen.instants[-1] > 0.5:
+                done.append("replayed")
+                return [Command.FASTER, Command.REPLAY]
+            return []
+        return quit_at_the_end(screen)
+
+    screen = ScriptedScreen(script)
+    episode, _ = show(screen)
+    assert done == ["paused", "replayed"]
+    assert episode == plain
+    (restart,) = np.flatnonzero(np.diff(screen.instants) < 0.0)
+    assert screen.instants[restart] == pytest.approx(0.505)
+    assert screen.instants[restart + 1] == 0.0
+    assert screen.captions[0]["speed"] == "1/4 of real time"
+    assert any(caption["speed"] == "1/4 of real time, paused" for caption in screen.captions)
+    assert screen.captions[-1]["speed"] == "1/2 of real time"
+
+
+def test_one_can_quit_in_the_middle_and_in_a_pause():
+    screen = ScriptedScreen(lambda s: [Command.QUIT] if s.instants[-1] > 0.2 else [])
+    assert show(screen)[0] is None
+    screen = ScriptedScreen(lambda s: [Command.QUIT] if len(s.captions) > 50 else [])
+    assert show(screen, paused=True)[0] is None
+    assert screen.instants == [0.0]
+
+
+def test_the_jump_can_be_seen_again_when_it_is_over(plain):
+    ends = []
+
+    def script(screen):
+        if not quit_at_the_end(screen):
+            return []
+        ends.append(len(screen.instants))
+        return [Command.REPLAY] if len(ends) < 3 else [Command.QUIT]
+
+    screen = ScriptedScreen(script)
+    assert show(screen, speed=1.0)[0] == plain
+    assert ends == [ends[0], 2 * ends[0], 3 * ends[0]]
+
+
+def test_a_stage_is_a_copy_at_the_same_state(model):
+    data = mujoco.MjData(model)
+    data.qpos[2], data.qvel[0], data.time = 0.7, 0.3, 1.5
+    mujoco.mj_forward(model, data)
+    stage = Stage(model)
+    stage.take(data)
+    stage.set()
+    np.testing.assert_array_equal(stage.data.xpos, data.xpos)
+    assert stage.data.time == 1.5
+
+    stage.data.qpos[:] = 9.0
+    stage.model.opt.gravity[:] = 0.0
+    assert data.qpos[2] == 0.7
+    assert model.opt.gravity[2] < -9.0
+    stage.set()
+    np.testing.assert_array_equal(stage.data.qpos, data.qpos)
+
+
+def test_the_camera_starts_where_that_of_the_videos_stands(model):
+    stage, camera = Stage(model), mujoco.MjvCamera()
+    stage.aim(camera)
+    azimuth, elevation = np.radians((camera.azimuth, camera.elevation))
+    ahead = np.array(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth),
+         np.sin(elevation)]
+    )  # fmt: skip
+    expected = model.cam_pos0[model.camera("side").id]
+    np.testing.assert_allclose(camera.lookat - camera.distance * ahead, expected, atol=1e-9)
+    assert np.linalg.norm(camera.lookat[:2]) < 0.3
+
+
+# Browser
+
+
+def listeners():
+    """Addresses that this process listens on."""
+    connections = psutil.Process().net_connections(kind="inet")
+    return {(c.laddr.ip, c.laddr.port) for c in connections if c.status == psutil.CONN_LISTEN}
+
+
+def get(address):
+    with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
+        return answer.status, answer.read()
+
+
+serves = pytest.mark.filterwarnings("ignore::ResourceWarning")
+"""Studio leaves its connections to the garbage collector."""
+
+
+@pytest.fixture
+def browser_screen():
+    yield pytest.importorskip("icub_jump_env.simulation.viewers.browser").BrowserScreen
+    gc.collect()
+
+
+@serves
+def test_the_page_is_served_to_this_machine_alone(model, browser_screen, capsys):
+    before = listeners()
+    with contextlib.closing(browser_screen(model)) as screen:
+        opened = listeners() - before
+        port = int(screen.address.removeprefix("http://127.0.0.1:").removesuffix("/"))
+        assert ("127.0.0.1", port) in opened
+        assert {ip for ip, _ in opened} == {"127.0.0.1"}
+        status, page = get(screen.address)
+        assert status == 200
+        assert b"<canvas" in page
+        for file in ("web_client.js", "web_client.wasm"):
+            status, content = get(screen.address + file)
+            assert status == 200
+            assert len(content) > 100_000
+        size = json.loads(get(screen.address + "model?total_bytes")[1])["total_bytes"]
+        assert size > 10_000
+        assert screen.refresh({"time": "0.000 s"}) == []
+    assert listeners() == before
+    assert capsys.readouterr().out == ""
+
+
+@serves
+def test_it_can_be_opened_again(model, browser_screen):
+    """Studio crashes where a viewer meets the remains of another."""
+    for _ in range(2):
+        with contextlib.closing(browser_screen(model)) as screen:
+            assert get(screen.address)[0] == 200
+            assert screen.refresh({}) == []
+
+
+@serves
+def test_it_does_not_start_where_others_could_connect(model, browser_screen, monkeypatch):
+    """As if a future Studio chose its address in another way."""
+    from icub_jump_env.simulation.viewers.browser import LoopbackViewer
+
+    before = listeners()
+    monkeypatch.setattr(LoopbackViewer, "_host", None)
+    with pytest.raises(OSError, match=r"would listen on (::|0\.0\.0\.0) "):
+        browser_screen(model)
+    assert listeners() == before
+
+
+@serves
+def test_the_episode_in_the_browser_is_that_of_run_episode(plain, browser_screen):
+    clock, env = Clock(), make_env(traced(SHORT))
+    with contextlib.closing(browser_screen(env.model)) as screen:
+        refresh = screen.refresh
+
+        def refresh_until_the_end(caption):
+            return refresh(caption) + [Command.QUIT] * (caption["phase"] == "stood")
+
+        screen.refresh = refresh_until_the_end
+        pace, never = Playback(clock=clock), threading.Event()
+        episode = Show(env, 0, screen, pace, never, clock, clock.sleep).run()
+    env.close()
+    assert episode == plain
+
+
+@serves
+def test_a_taken_port_is_refused(model, browser_screen):
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        with pytest.raises(ConfigError, match=f"port={port} is not allowed: a port that nobody"):
+            browser_screen(model, port)
+    for nonsense in (-1, 65536):
+        with pytest.raises(ConfigError, match=f"port={nonsense} .* from 0 to 65535"):
+            browser_screen(model, nonsense)
+
+
+def test_every_button_and_key_of_the_page_has_its_command(monkeypatch):
+    view_browser = pytest.importorskip("icub_jump_env.simulation.viewers.browser")
+    real, pressed, written = view_browser.imgui, set(), []
+    fake = types.SimpleNamespace(
+        Key=real.Key, Cond=real.Cond, WindowFlags=real.WindowFlags, Vec2=real.Vec2,
+        SetNextWindowPos=lambda *_: None, Begin=lambda *_, **__: None, End=lambda: None,
+        SameLine=lambda: None, NewLine=lambda: None, TextUnformatted=written.append,
+        IsKeyPressed=lambda key, repeat: key in pressed, Button=lambda label: label in pressed,
+    )  # fmt: skip
+    monkeypatch.setattr(view_browser, "imgui", fake)
+    commands = CommandQueue()
+    panel = view_browser.Panel(commands)
+    panel.caption = {"time": "0.100 s", "phase": "launch"}
+    keys = real.Key
+    for one, command in {
+        keys.Space: Command.PAUSE,
+        keys.RightArrow: Command.STEP,
+        keys.DownArrow: Command.SLOWER,
+        keys.UpArrow: Command.FASTER,
+        keys.Backspace: Command.REPLAY,
+        "Play / pause": Command.PAUSE,
+        "Step": Command.STEP,
+        "Slower": Command.SLOWER,
+        "Faster": Command.FASTER,
+        "Replay": Command.REPLAY,
+        "Quit": Command.QUIT,
+    }.items():
+        pressed = {one}
+        panel.build(None)
+        assert commands.take() == [command]
+    assert written[:2] == ["time: 0.100 s", "phase: launch"]
+
+
+def test_a_missing_studio_names_the_remedy(model, monkeypatch):
+    monkeypatch.delitem(sys.modules, "icub_jump_env.simulation.viewers.browser", raising=False)
+    monkeypatch.setitem(sys.modules, "mujoco.studio", None)
+    with pytest.raises(MissingDependencyError, match=r"MuJoCo Studio .* pip install mujoco"):
+        view.open_browser_screen(model, 0, Console(file=io.StringIO()))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a child alone")
+def test_ctrl_c_ends_the_show_without_a_complaint():
+    pytest.importorskip("icub_jump_env.simulation.viewers.browser")
+    program = (
+        "from rich.console import Console\n"
+        "from icub_jump_env.config import JumpConfig\n"
+        "from icub_jump_env.evaluation.view import view\n"
+        "view(JumpConfig(), 0, Console(), 'browser')\n"
+        "print('ended')\n"
+    )
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        try:
+            address, keys = process.stdout.readline(), process.stdout.readline()
+            assert get(address.split()[1])[0] == 200
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
+    assert "Backspace: replay" in keys
+    assert (process.returncode, out, err) == (0, "ended\n", "")
+
+
+# Window
+
+
+class FakeViewer:
+    """Stands in for the handle of MuJoCo's viewer."""
+
+    def __init__(self):
+        self.running = True
+        self.synced = 0
+        self.texts = None
+        self.cam = mujoco.MjvCamera()
+        self.press = None
+
+    def launch_passive(self, model, data, *, key_callback, **_):
+        self.data, self.press = data, key_callback
+        return self
+
+    def is_running(self):
+        return self.running
+
+    def lock(self):
+        return contextlib.nullcontext()
+
+    def sync(self):
+        self.synced += 1
+
+    def set_texts(self, texts):
+        self.texts = texts
+
+    def close(self):
+        self.running = False
+
+
+@pytest.fixture
+def viewer(monkeypatch):
+    fake = FakeViewer()
+    module = types.ModuleType("mujoco.viewer")
+    module.launch_passive = fake.launch_passive
+    monkeypatch.setitem(sys.modules, "mujoco.viewer", module)
+    monkeypatch.setattr(mujoco, "viewer", module, raising=False)
+    monkeypatch.setattr(window, "check_window", lambda: None)
+    return fake
+
+
+def test_the_window_shows_the_state_and_takes_keys(model, viewer):
+    data = mujoco.MjData(model)
+    data.qpos[2], data.time = 0.8, 2.0
+    with contextlib.closing(WindowScreen(model)) as screen:
+        screen.show(data)
+        assert screen.refresh({"time": "2.000 s", "phase": "flight"}) == []
+        assert (viewer.data.time, viewer.data.qpos[2], viewer.synced) == (2.0, 0.8, 1)
+        assert viewer.texts[2:] == ("time\nphase", "2.000 s\nflight")
+        for key in (32, 262, 264, 265, 259, 65):  # the last one, A, says nothing to us
+            viewer.press(key)
+        assert screen.refresh({}) == [
+            Command.PAUSE, Command.STEP, Command.SLOWER, Command.FASTER, Command.REPLAY,
+        ]  # fmt: skip
+        viewer.running = False
+        assert screen.refresh({}) == [Command.QUIT]
+    assert not viewer.running
+
+
+def test_ctrl_c_closes_the_window_and_is_no_interrupt(viewer, monkeypatch):
+    monkeypatch.setattr(FakeViewer, "sync", lambda _: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(view, "in_browser", lambda _: False)
+    previous = signal.getsignal(signal.SIGINT)
+    out = io.StringIO()
+    view.view(SHORT, 0, Console(file=out))
+    assert signal.getsignal(signal.SIGINT) is previous
+    assert not viewer.running
+    assert "Space: play or pause" in out.getvalue()
+
+
+def test_a_second_ctrl_c_is_not_held_back():
+    pressed = []
+    previous = signal.signal(signal.SIGINT, lambda *_: pressed.append("twice"))
+    try:
+        with view.ctrl_c() as enough:
+            signal.raise_signal(signal.SIGINT)
+            assert enough.is_set()
+            assert not pressed
+            signal.raise_signal(signal.SIGINT)
+            assert pressed == ["twice"]
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def test_the_meshes_are_shown_and_no_picture_is_rendered(viewer, monkeypatch):
+    models = []
+
+    def refuse(*_):
+        raise AssertionError("nothing is to be rendered")
+
+    def remember(model, *_):
+        models.append(model)
+        return ScriptedScreen(lambda _: [Command.QUIT])
+
+    monkeypatch.setattr("icub_jump_env.simulation.rendering.open_context", refuse)
+    monkeypatch.setattr(view, "open_window_screen", remember)
+    view.view(SHORT, 0, Console(file=io.StringIO()), "window")
+    assert models[0].nmesh > 0
+
+
+def test_without_a_display_it_is_the_browser(monkeypatch):
+    monkeypatch.setattr(window, "has_display", lambda: False)
+    assert view.in_browser("auto")
+    assert not view.in_browser("window")
+    with pytest.raises(MissingDependencyError, match=r"no window .* in the browser instead"):
+        WindowScreen(None)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only there it is tried out")
+def test_without_a_reachable_display_it_is_the_browser(monkeypatch):
+    """MuJoCo's viewer would wait for ever."""
+    monkeypatch.setattr(window, "has_display", lambda: True)
+    failing = types.SimpleNamespace(init=lambda: warnings.warn("no display", stacklevel=1))
+    monkeypatch.setitem(sys.modules, "glfw", failing)
+    assert view.in_browser("auto")
+    with pytest.raises(MissingDependencyError, match="no window"):
+        check_window()
+
+
+@pytest.mark.skipif(not has_display(), reason="needs a display")
+def test_a_real_window_opens_and_closes(model):
+    check_window()
+    with contextlib.closing(WindowScreen(model)) as screen:
+        screen.show(mujoco.MjData(model))
+        assert screen.refresh({"time": "0.000 s"}) == []
+    assert screen.refresh({}) == [Command.QUIT]
