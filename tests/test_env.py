@@ -103,6 +103,7 @@ def test_info_of_every_step(env):
         assert info["outcome"] == "running"
         assert set(info["jump"]) == {
             "takeoff_time", "takeoff_velocity", "ballistic_height", "flight_time",
+            "sole_slip", "chest_lean",
             "flight_height", "apex_height", "sole_height", "flight_rotation",
             "base_pitch_range", "angular_momentum_takeoff", "peak_ground_force", "landed",
             "solver_failures", "limit_violations",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,6 +15,18 @@ from icub_jump_env.errors import ConfigError
 
 STUDY_EPISODES = 20
 """Episodes of each case of a study, where errors and noise are drawn anew."""
+
+_MODES = ("study", "sweep", "report", "view")
+_COMMON = ("config", "seed")
+_USED = {
+    "nominal": ("episodes", "json", "plot", "video"),
+    "statistics": ("episodes", "jobs", "results", "resume", "json", "plot", "video"),
+    "study": ("episodes", "jobs", "json", "plot"),
+    "sweep": ("jobs", "json", "plot"),
+    "report": (),
+    "view": (),
+}
+"""Options that each mode uses, beside the common ones and its own."""
 
 
 @dataclass(frozen=True)
@@ -63,16 +76,20 @@ class EvalOptions:
             check_count("episodes", self.episodes, 1)
         check_count("seed", self.seed, 0)
         check_count("jobs", self.jobs, 1)
-        chosen = [mode for mode in ("study", "sweep", "report", "view") if getattr(self, mode)]
+        chosen = [mode for mode in _MODES if getattr(self, mode)]
         if len(chosen) > 1:
-            raise ConfigError(chosen[0], True, f"not together with {' and '.join(chosen[1:])}")
-        if self.mode != "statistics" and (self.resume or self.results is not None):
-            raise ConfigError("resume", True, "only in an evaluation of several episodes")
+            raise ConfigError(chosen[0], getattr(self, chosen[0]), f"not with --{chosen[1]}")
+        used = (*_COMMON, *_USED[self.mode], *chosen)
+        for option in dataclasses.fields(self):
+            value = getattr(self, option.name)
+            if option.name not in used and value != option.default:
+                where = f"--{self.mode}" if chosen else "a single jump that nothing randomises"
+                raise ConfigError(option.name, value, f"not with {where}")
 
     @property
     def mode(self) -> str:
         """Which of eval.py's modes is meant."""
-        for mode in ("study", "sweep", "report", "view"):
+        for mode in _MODES:
             if getattr(self, mode):
                 return mode
         several = self.episodes is not None and self.episodes > 1

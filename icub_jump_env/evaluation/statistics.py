@@ -100,8 +100,8 @@ class Statistics:
         } | {"percentiles": self.percentiles, "failures": self.failures}
 
 
-def run_statistics(options: EvalOptions, console: Console, progress: Console) -> list[Episode]:
-    """Run eval.py with several episodes or a randomised world; print and return them."""
+def run_statistics(options: EvalOptions, console: Console, progress: Console) -> None:
+    """Run eval.py with several episodes or a randomised world."""
     config, episodes = options.config, options.episodes or 1
     log = EpisodeLog(
         options.results or default_log(config, options.seed, episodes),
@@ -132,7 +132,13 @@ def run_statistics(options: EvalOptions, console: Console, progress: Console) ->
             options.json,
             asked | provenance(config, options.seed) | statistics.as_dict(),
         )
-    return done
+    if options.plot is not None:
+        from icub_jump_env.evaluation.statistics_figure import statistics_figure
+
+        options.plot.mkdir(parents=True, exist_ok=True)
+        file = options.plot / "statistics.png"
+        statistics_figure(done, config.jump_height).savefig(file)
+        console.print(f"wrote {file}", soft_wrap=True)
 
 
 def default_log(config: JumpConfig, seed: int, episodes: int) -> Path:

@@ -1,0 +1,60 @@
+"""The picture of many episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from icub_jump_env.evaluation.failures import Failure
+from icub_jump_env.evaluation.figures import ACCENT, DESIRED, MEASURED
+from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.table import CM, DEG
+from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
+
+_MARKERS = {
+    None: "o",
+    Failure.DIVERGED: "*",
+    Failure.NO_TAKEOFF: "v",
+    Failure.OVER_ROTATED: "x",
+    Failure.SLIPPED: "s",
+    Failure.FELL_FORWARD: ">",
+    Failure.FELL_BACKWARD: "<",
+    Failure.FELL_SIDEWAYS: "D",
+    Failure.TOO_LOW: "_",
+}
+
+
+def statistics_figure(episodes: Sequence[Episode], jump_height: float) -> Figure:
+    """Rise and rotation of every episode that flew; failures by class.
+
+    Args:
+        episodes: The episodes.
+        jump_height: Commanded height (m).
+    """
+    figure = Figure(figsize=(6.5, 4.0), dpi=120, layout="constrained")
+    axis = figure.subplots()
+    for kind, marker in _MARKERS.items():
+        shown = [e for e in episodes if e.failure is kind]
+        if shown:
+            axis.plot(
+                [CM * e.jump["flight_height"] for e in shown],
+                [DEG * e.jump["flight_rotation"] for e in shown],
+                marker,
+                color=MEASURED if kind is None else DESIRED,
+                ms=4 if kind is None else 7,
+                label=f"{kind or 'success'}: {len(shown)}",
+            )
+    axis.axvline(CM * jump_height, color=ACCENT, lw=0.8, label="command")
+    axis.axvline(
+        CM * MIN_HEIGHT_RATIO * jump_height,
+        color=ACCENT,
+        lw=0.8,
+        ls=":",
+        label="least for a success",
+    )
+    axis.set_xlabel("CoM rise (cm)")
+    axis.set_ylabel("rotation in flight (deg)")
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.legend(frameon=False, fontsize=8)
+    return figure
