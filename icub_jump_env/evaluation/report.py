@@ -307,9 +307,10 @@ def _fields(configs: list[JumpConfig]) -> list[tuple[str, str, bool]]:
     return fields
 
 
-def _number(value: float | None, signed: bool = False) -> str:
+def _number(value: float | None, unit: str | None = None, signed: bool = False) -> str:
     """As in the terminal's table, with a true minus sign and a true dash."""
-    return "–" if (text := number(value, signed)) == "-" else text.replace("-", "−")  # noqa: RUF001
+    text = number(value, unit, signed)
+    return "–" if text == "-" else text.replace("-", "−")  # noqa: RUF001
 
 
 def _render(**content: Any) -> str:

@@ -24,7 +24,7 @@ from icub_jump_env.evaluation.output import progress_display, strict_json, write
 from icub_jump_env.evaluation.parallel import run_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.table import QUANTITIES
+from icub_jump_env.evaluation.table import QUANTITIES, number
 
 CONFIDENCE = 0.95
 
@@ -165,7 +165,7 @@ def render(statistics: Statistics, options: EvalOptions) -> list[Table | str]:
         table.add_column(column, justify="right", no_wrap=True)
     for name, metric, unit, scale, _ in QUANTITIES:
         if metric != "landed":
-            values = (f"{scale * value:.3g}" for value in statistics.percentiles[metric])
+            values = (number(scale * value, unit) for value in statistics.percentiles[metric])
             table.add_row(f"{name}, {unit}", *values)
     lines = [f"landed and stands: {statistics.landed}", f"success: {statistics.success}"]
     for kind, seeds in statistics.failures.items():

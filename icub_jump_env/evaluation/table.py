@@ -96,9 +96,9 @@ def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Tab
         table.add_row(
             f"{row.quantity}, {row.unit}",
             number(row.paper),
-            number(row.ours),
-            number(row.difference, signed=True),
-            number(row.switched),
+            number(row.ours, row.unit),
+            number(row.difference, row.unit, signed=True),
+            number(row.switched, row.unit),
         )
     table.caption = (
         "paper: simulated heights and landing, commanded take-off, ballistic height of the real "
@@ -118,8 +118,15 @@ def verdict(rows: Sequence[Row], momentum_control: bool) -> str:
     return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
 
 
-def number(value: float | None, signed: bool = False) -> str:
-    """A number of the table; a dash where there is none."""
+_DECIMALS = {"cm": 2, "m/s": 3, "s": 3, "deg": 1, "steps": 0, "%": 0}
+
+
+def number(value: float | None, unit: str | None = None, signed: bool = False) -> str:
+    """A number of a table, with decimals that suit its unit; a dash where there is none.
+
+    Without a unit it has as many digits as its source gave it.
+    """
     if value is None or math.isnan(value):
         return "-"
-    return f"{value:+.3g}" if signed else f"{value:.3g}"
+    digits = "g" if unit is None else f".{_DECIMALS[unit]}f"
+    return f"{value:{'+' if signed else ''}{digits}}"
