@@ -13,6 +13,12 @@ from numpy.typing import NDArray
 from icub_jump_env.errors import ActionError, ConfigError
 
 
+def store(instance: Any, **values: Any) -> None:
+    """Give a frozen dataclass its checked and converted values, at its construction."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
+
+
 def check_choice(field: str, value: Any, allowed: tuple[Any, ...]) -> None:
     """Refuse anything but one of the ``allowed`` strings (or None, if among them)."""
     if (value is not None and not isinstance(value, str)) or value not in allowed:
@@ -35,10 +41,12 @@ def check_number(field: str, value: Any, low: float, high: float) -> float:
     return float(value)
 
 
-def check_count(field: str, value: Any, low: int) -> int:
-    """Refuse anything but a whole number from ``low``; return it as an int."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < low:
-        raise ConfigError(field, value, f"a whole number from {low}")
+def check_count(field: str, value: Any, low: int, high: int | None = None) -> int:
+    """Refuse anything but a whole number from ``low`` to ``high``; return it as an int."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < low or (high is not None and value > high):
+        upward = "" if high is None else f" to {high}"
+        raise ConfigError(field, value, f"a whole number from {low}{upward}")
     return int(value)
 
 
@@ -47,7 +55,9 @@ def check_numbers(
 ) -> tuple[float, ...]:
     """Refuse anything but ``length`` numbers from ``low`` to ``high``."""
     allowed = f"{length} numbers from {low:g} to {high:g}"
-    if not isinstance(values, Sequence | np.ndarray) or len(values) != length:
+    # An array without axes has no length.
+    listed = isinstance(values, Sequence | np.ndarray) and np.ndim(values) > 0
+    if not listed or len(values) != length:
         raise ConfigError(field, values, allowed)
     try:
         return tuple(check_number(field, value, low, high) for value in values)

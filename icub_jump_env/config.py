@@ -5,9 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Self, TypeVar, get_args
-
-import dacite
+from typing import Any, Literal, Self, TypeVar, get_args, get_type_hints
 
 from icub_jump_env.checks import (
     check_choice,
@@ -30,7 +28,12 @@ from icub_jump_env.simulation.randomization import (
     Randomization,
     RandomizationName,
 )
-from icub_jump_env.simulation.sensor_models import SENSORS, SensorConfig, SensorName
+from icub_jump_env.simulation.sensor_models import (
+    MAX_DELAY,
+    SENSORS,
+    SensorConfig,
+    SensorName,
+)
 
 T = TypeVar("T")
 
@@ -139,7 +142,9 @@ class JumpConfig:
                 self._store(field, _from_mapping(field, value, kind))
             elif not isinstance(value, kind):
                 check_choice(field, value, tuple(names))
-        self._store("command_delay", check_count("command_delay", self.command_delay, 0))
+        self._store(
+            "command_delay", check_count("command_delay", self.command_delay, 0, MAX_DELAY)
+        )
 
     def _check_rates(self) -> None:
         physics = 1.0 / self.timestep
@@ -229,11 +234,29 @@ class JumpConfig:
         return dataclasses.replace(self, **options)
 
 
-def _from_mapping(field: str, values: Mapping[str, Any], kind: type[T]) -> T:
-    """A ``kind`` from a plain mapping, such as a configuration that was saved as JSON."""
-    try:
-        return dacite.from_dict(kind, values, dacite.Config(strict=True, cast=[tuple]))
-    except dacite.DaciteError as error:
-        raise ConfigError(
-            field, dict(values), f"a {kind.__name__} or its fields; {error}"
-        ) from None
+def _from_mapping(name: str, values: Mapping[str, Any], kind: type[T]) -> T:
+    """A ``kind`` from a plain mapping, such as a configuration that was saved as JSON.
+
+    Fields that are dataclasses themselves are mappings, too; where there are several to
+    choose from, their ``kind`` says which.
+    """
+    hints = get_type_hints(kind)
+    made = {}
+    for key, value in values.items():
+        if key not in hints:
+            allowed = f"no such field; the fields of {name} are {', '.join(hints)}"
+            raise ConfigError(str(key), value, allowed)
+        options = [t for t in (hints[key], *get_args(hints[key])) if dataclasses.is_dataclass(t)]
+        if options and isinstance(value, Mapping):
+            value = _from_mapping(key, value, _choose(key, value, options))
+        made[key] = value
+    return kind(**made)
+
+
+def _choose(name: str, values: Mapping[str, Any], options: list[Any]) -> Any:
+    if len(options) == 1:
+        return options[0]
+    by_kind = {option.kind: option for option in options}
+    kind = values.get("kind")
+    check_choice(f"{name}.kind", kind, tuple(by_kind))
+    return by_kind[kind]

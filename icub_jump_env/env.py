@@ -76,7 +76,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     the registration only guards.
 
     ## Info
-    At reset: ``world`` (what was drawn, :class:`icub_jump_env.simulation.randomization.World`).
+    At reset, what was drawn: ``world`` (:class:`icub_jump_env.simulation.randomization.World`)
+    and ``sensor_errors`` (bias and drift by kind of reading, and the force gain).
     Every step: ``jump`` (dict of :class:`icub_jump_env.metrics.jump.JumpMetrics`, final
     at the end), ``is_success``, ``outcome``, ``phase``, ``time``, ``diverged``,
     ``jump_height``, ``solver_status``, ``solver_primal_residual``,
@@ -186,7 +187,11 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._observe()
         if self.render_mode == "human":
             self.render()
-        return self._observation.copy(), self._info() | {"world": self._simulation.world.as_dict()}
+        drawn = {
+            "world": self._simulation.world.as_dict(),
+            "sensor_errors": self._simulation.sensors.drawn(),
+        }
+        return self._observation.copy(), self._info() | drawn
 
     def step(
         self, action: NDArray[np.float32]

@@ -13,10 +13,11 @@ from conftest import ZERO, jump, random_action, rollout
 from gymnasium.utils.env_checker import check_env
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.command import JointCommand
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.rollout import make_env
 from icub_jump_env.robot import facts
-from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig
+from icub_jump_env.simulation.actuators.config import ACTUATORS, FRICTION, ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 from icub_jump_env.simulation.actuators.torque_loops import CurrentControl, TorqueFeedback
 from icub_jump_env.simulation.randomization import RANDOMIZATIONS, Randomization
@@ -94,8 +95,26 @@ class TestDeterminism:
             np.testing.assert_array_equal(env.step(ZERO)[0], twin.step(ZERO)[0])
         assert env.reset()[1]["world"] == twin.reset()[1]["world"]
 
-    def test_none_is_the_nominal_jump_whatever_came_before(self, nominal):
-        """Naming the ideal models by their fields changes no bit."""
+    @pytest.mark.parametrize("actuators", ["ideal", "realistic"])
+    def test_a_reset_in_the_middle_of_a_launch_leaves_nothing_behind(self, actuators):
+        config = {
+            "controller": "torque", "actuators": actuators, "sensors": "realistic",
+            "command_delay": 2, "stand_time": 0.1,
+        }  # fmt: skip
+        fresh = rollout(gymnasium.make("ICubJump-v0", **config), seed=3)[0]
+        env = gymnasium.make("ICubJump-v0", **config)
+        env.reset(seed=1)
+        for _ in range(30):
+            env.step(np.ones(3, np.float32))
+        np.testing.assert_array_equal(rollout(env, seed=3)[0], fresh)
+
+    def test_robots_are_at_rest_after_a_reset(self):
+        env = gymnasium.make("ICubJump-v0", randomization="hard").unwrapped
+        for seed in range(3):
+            env.reset(seed=seed)
+            assert not env.data.qvel.any()
+
+    def test_naming_the_ideal_models_changes_nothing(self, nominal):
         explicit = jump(
             actuators=ActuatorConfig(),
             sensors=SensorConfig(),
@@ -229,6 +248,76 @@ class TestEffects:
         np.testing.assert_allclose(env.data.qpos[7:] + bias, shown, atol=1e-12)
         np.testing.assert_allclose(shown, env._crouch, atol=0.012)
 
+    def test_both_sources_of_encoder_bias_show_and_servos_see_them(self):
+        ranges = Randomization(encoder_bias=(0.01, 0.01))
+        biased = SensorConfig(joint_position=SensorError(bias=0.004))
+        env = make_env(JumpConfig(randomization=ranges, sensors=biased))
+        _, info = env.reset(seed=0)
+        own = np.array(info["sensor_errors"]["joint_position"]["bias"])
+        assert 0.001 < np.abs(own).max() <= 0.004
+        shown = env._simulation.sensors.joint_position
+        bias = np.array(info["world"]["encoder_bias"]) + own
+        np.testing.assert_allclose(env.data.qpos[7:] + bias, shown, atol=1e-12)
+        np.testing.assert_allclose(shown, env._crouch, atol=0.012)
+
+    def test_sensor_noise_is_that_of_the_realistic_sensors(self):
+        env = make_env(JumpConfig(randomization=Randomization(sensor_noise=(1.0, 1.0))))
+        env.reset(seed=0)
+        sensors, errors = env._simulation.sensors, []
+        for _ in range(200):
+            sensors.read()
+            errors.append(sensors.joint_velocity - env.data.qvel[6:])
+        expected = SENSORS["realistic"].joint_velocity.noise
+        assert np.std(errors) == pytest.approx(expected, rel=0.05)
+        assert env._simulation.sensors.drawn()["gyro"]["bias"] == (0.0, 0.0, 0.0)
+
+    def test_sensor_errors_differ_between_seeds_and_not_with_other_errors(self):
+        def gyro_bias(seed, **other):
+            config = SensorConfig(gyro=SensorError(bias=0.1), **other)
+            env = make_env(JumpConfig(sensors=config))
+            return env.reset(seed=seed)[1]["sensor_errors"]["gyro"]["bias"]
+
+        alone = gyro_bias(7)
+        assert alone == gyro_bias(7, joint_position=SensorError(bias=0.01, noise=0.001))
+        assert alone == gyro_bias(7, force_gain=0.1)
+        assert alone != gyro_bias(8)
+
+    def test_force_sensor_errors_reach_the_torque_loop(self):
+        biased = SensorConfig(force=SensorError(bias=20.0))
+        knee = facts.JOINT_INDEX["l_knee"]
+        torques = []
+        for sensors in (SensorConfig(), biased):
+            env = make_env(
+                JumpConfig(controller="torque", actuators="torque_feedback", sensors=sensors)
+            )
+            env.reset(seed=0)
+            for _ in range(5):
+                env.step(ZERO)
+            torques.append(env.data.ctrl[knee])
+        assert abs(torques[0] - torques[1]) > 0.3
+
+    def test_joint_gains_vary(self):
+        """A weaker servo holds the crouch less exactly against the same load."""
+        errors = []
+        for gain in (0.5, 1.0):
+            ranges = Randomization(joint_gain=(gain, gain), payload_mass=(3.0, 3.0))
+            env = make_env(JumpConfig(randomization=ranges))
+            env.reset(seed=0)
+            errors.append(np.abs(env.data.qpos[7:] - env._crouch).max())
+        assert errors[0] > 1.3 * errors[1]
+
+    def test_friction_acts_in_full_while_a_motor_brakes_at_its_limit(self):
+        """MuJoCo clamps motor torques at the effort limit, but not what friction adds."""
+        env = make_env(JumpConfig(actuators="realistic"))
+        env.reset(seed=0)
+        simulation, data = env._simulation, env.data
+        data.qvel[6:] = 3.0
+        simulation.command(JointCommand(-facts.VELOCITY_LIMIT))
+        simulation.step()
+        friction = FRICTION * facts.EFFORT_LIMIT
+        np.testing.assert_allclose(data.qfrc_actuator[6:], -facts.EFFORT_LIMIT, atol=1e-9)
+        np.testing.assert_allclose(data.qfrc_applied[6:], -friction, rtol=1e-6)
+
     def test_slope_shows_in_the_imu(self):
         slope = 0.02
         env = make_env(JumpConfig(randomization=Randomization(slope=(slope, slope))))
@@ -278,12 +367,9 @@ class TestConfiguration:
     @pytest.mark.parametrize(
         ("field", "value"),
         [
-            ("actuators", "magic"), ("actuators", 3), ("actuators", {"wings": 1}),
-            ("actuators", {"torque_loop": {"kind": "magic"}}), ("actuators", DCMotor()),
-            ("sensors", None), ("sensors", {"gyro": {"nose": 1.0}}), ("sensors", {"gyro": 0.1}),
-            ("randomization", "extreme"), ("randomization", {"friction": [0.4]}),
-            ("randomization", {"friction": "low"}), ("command_delay", -1),
-            ("command_delay", 1.5), ("command_delay", True),
+            ("actuators", "magic"), ("actuators", 3), ("actuators", DCMotor()), ("sensors", None),
+            ("randomization", "extreme"), ("command_delay", -1), ("command_delay", 1.5),
+            ("command_delay", True), ("command_delay", 10**30),
         ],
     )  # fmt: skip
     def test_bad_models_are_refused(self, field, value):
@@ -291,6 +377,38 @@ class TestConfiguration:
             JumpConfig(**{field: value})
         assert refusal.value.field == field
 
-    def test_a_bad_value_inside_a_model_names_its_field(self):
-        with pytest.raises(ConfigError, match=r"friction=.*lower bound first"):
-            JumpConfig(randomization={"friction": [1.0, 0.4]})
+    @pytest.mark.parametrize(
+        ("field", "value", "words"),
+        [
+            ("actuators", {"wings": 1}, ("wings", "no such field", "torque_loop")),
+            ("actuators", {"torque_loop": {"kind": "magic"}}, ("torque_loop.kind", "'current'")),
+            ("actuators", {"torque_loop": {"bandwidth": 20.0}}, ("torque_loop.kind", "None")),
+            ("actuators", {"motor": {"kind": "dc", "current_limit": 1.2}}, ("current_limit", "1.2", "0.01 to 1")),
+            ("actuators", {"torque_loop": {"kind": "feedback", "bandwidth": 2000}}, ("bandwidth=2000", "0.1 to 1000")),
+            ("actuators", {"torque_loop": {"kind": "feedback", "current_limit": 1}}, ("current_limit", "no such field")),
+            ("actuators", {"servo": 3}, ("servo=3", "ServoGains")),
+            ("sensors", {"gyro": {"nose": 1.0}}, ("nose", "noise")),
+            ("sensors", {"gyro": 0.1}, ("gyro=0.1", "SensorError")),
+            ("sensors", {"delay": 10**30}, ("delay", "0 to 100")),
+            ("randomization", {"friction": [0.4]}, ("friction", "2 numbers")),
+            ("randomization", {"friction": "low"}, ("friction", "'low'")),
+            ("randomization", {"friction": {0.4, 0.5}}, ("friction", "2 numbers")),
+            ("randomization", {"friction": np.array(0.5)}, ("friction", "2 numbers")),
+            ("randomization", {"friction": [1.0, 0.4]}, ("friction", "lower bound first")),
+            ("randomization", {3: [1.0, 0.4]}, ("3", "no such field")),
+        ],
+    )  # fmt: skip
+    def test_a_bad_value_inside_a_model_names_its_field_and_range(self, field, value, words):
+        with pytest.raises(ConfigError) as refusal:
+            JumpConfig(**{field: value})
+        for word in words:
+            assert word in str(refusal.value)
+
+    def test_numpy_values_become_plain(self):
+        config = JumpConfig(
+            sensors={"delay": np.int64(1), "gyro": {"noise": np.float32(0.5)}},
+            randomization={"friction": np.array([0.4, 0.5])},
+            actuators={"friction": np.float64(0.05), "servo": {"stiffness": np.int32(1000)}},
+        )
+        assert json.loads(json.dumps(dataclasses.asdict(config)))["sensors"]["delay"] == 1
+        make_env(config).reset(seed=0)

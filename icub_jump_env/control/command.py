@@ -12,10 +12,11 @@ from icub_jump_env.robot import facts
 Array = NDArray[np.float64]
 
 _AT_REST = np.zeros(facts.N_JOINTS)
+_AT_REST.setflags(write=False)
 
 
 class JointCommand(NamedTuple):
-    """Command to the joint servos, valid until the next control tick.
+    """Command to the joint servos, valid until the next one; its arrays are its own.
 
     Attributes:
         velocity: (23,) desired joint velocities (rad/s).
@@ -28,11 +29,3 @@ class JointCommand(NamedTuple):
     velocity: Array = _AT_REST
     position: Array | None = None
     torque: Array | None = None
-
-    def copy(self) -> JointCommand:
-        """A copy that outlives the controller's next tick, which may reuse its arrays."""
-        return JointCommand(
-            self.velocity.copy(),
-            None if self.position is None else self.position.copy(),
-            None if self.torque is None else self.torque.copy(),
-        )

@@ -36,7 +36,8 @@ class _Undefined(float):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, float) and math.isnan(other)
 
-    __hash__ = float.__hash__
+    def __hash__(self) -> int:
+        return hash("undefined")  # that of a NaN depends on which one it is
 
 
 UNDEFINED = _Undefined("nan")
@@ -73,7 +74,8 @@ class JumpMetrics:
             axes (kg m^2/s).
         peak_ground_force: Largest vertical ground force of the episode (N).
         sole_slip: Largest horizontal way of a sole's centre on the ground (m), from where it
-            stood at the start or at touch-down, while the chest is within 30 deg of upright.
+            stood at the start or at the last touch-down, while the chest is within 30 deg of
+            upright. The way of a foot that is lifted alone counts, too.
         chest_lean: Forward and leftward lean of the chest at the end (rad), in the sagittal and
             the frontal plane.
         landed: Whether, ``stand_time`` after touch-down, only the feet have touched the
@@ -243,7 +245,7 @@ class JumpRecorder:
         if flight.duration >= CHATTER_TIME and flight.apex >= self._best_apex:
             self.metrics.flight_time = time - flight.time
             self.touchdown_time = time
-            self._footholds = None
+        self._footholds = None
         self._flight = None
 
 

@@ -20,9 +20,9 @@ _HUGE = 1e3
 class Physics:
     """One iCub on a floor.
 
-    The state is written in :meth:`reset` alone; after it forces enter only as joint
-    torques through ``data.ctrl``, and as a push on the chest through
-    ``data.xfrc_applied`` where one is drawn.
+    The state is written in :meth:`reset` alone; after it forces enter only as motor
+    torques through ``data.ctrl``, and where the models have them as gear friction through
+    ``data.qfrc_applied`` and as a push on the chest through ``data.xfrc_applied``.
 
     Attributes:
         model: The MuJoCo model.
@@ -43,6 +43,7 @@ class Physics:
         self.joint_position = data.qpos[7:]
         self.joint_velocity = data.qvel[6:]
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._joint_force = data.qfrc_applied[6:]
         self._chest_force = data.xfrc_applied[self.model.body(facts.CHEST_LINK).id]
         self._warnings = data.warning.number
         self._last_time = data.time
@@ -76,14 +77,18 @@ class Physics:
         self.data.time = self._last_time = self.evaluated_time = 0.0
         mujoco.mj_forward(self.model, self.data)
 
-    def step(self, torque: Array, push: float = 0.0) -> None:
+    def step(self, torque: Array, friction: Array | None = None, push: float = 0.0) -> None:
         """Advance by one physics step.
 
         Args:
-            torque: (23,) joint torques (Nm).
+            torque: (23,) motor torques on the joint side (Nm), which MuJoCo clamps at the
+                effort limits.
+            friction: (23,) torques that joint friction takes away from them (Nm).
             push: Force on the chest's CoM along +x (N).
         """
         self._ctrl[:] = torque
+        if friction is not None:
+            np.negative(friction, out=self._joint_force)
         self._chest_force[0] = push
         self.evaluated_time = self.data.time
         mujoco.mj_step(self.model, self.data)

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.checks import check_range
+from icub_jump_env.checks import check_range, store
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.robot import facts
 
@@ -25,7 +25,7 @@ _DEG = math.radians(1.0)
 _ALLOWED: Mapping[str, Range] = MappingProxyType(
     {
         "link_mass": (0.5, 2.0),
-        "payload_mass": (-2.0, 5.0),
+        "payload_mass": (-1.0, 5.0),
         "payload_offset": (0.0, 0.1),
         "friction": (0.05, 3.0),
         "strength": (0.1, 1.0),
@@ -53,11 +53,13 @@ class Randomization:
         payload_offset: Distance of the payload from the chest's CoM (m), in a random
             direction.
         friction: Coulomb friction of the contact between soles and floor.
-        strength: Share of the torque that the motors give, of each joint on its own.
+        strength: Share of their largest torque that the motors reach, of each joint on its
+            own.
         delay: Control ticks until a command takes effect, whole numbers.
         joint_gain: Factor on the servo gains, of each joint on its own.
         damping: Factor on the viscous damping, of each joint on its own.
-        sensor_noise: Factor on the noise of the realistic sensors.
+        sensor_noise: Factor on the noise of the realistic sensors, which comes on top of
+            whatever the sensors have.
         slope: Slope of the ground (rad), positive uphill in +x; gravity is tilted, so that
             the world frame stays with the floor.
         encoder_bias: Constant encoder error (rad) of each leg pitch joint: hips, knees,
@@ -86,7 +88,7 @@ class Randomization:
         for field in dataclasses.fields(self):
             low, high = _ALLOWED[field.name]
             values = check_range(field.name, getattr(self, field.name), low, high)
-            object.__setattr__(self, field.name, values)
+            store(self, **{field.name: values})
         if any(not bound.is_integer() for bound in self.delay):
             raise ConfigError("delay", self.delay, "whole numbers of control ticks")
 
@@ -144,7 +146,7 @@ BIASED_JOINTS = tuple(
 """The joints whose encoders ``encoder_bias`` falsifies."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class World:
     """What was drawn for one episode; the meaning is that of :class:`Randomization`.
 

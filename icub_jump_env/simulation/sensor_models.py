@@ -12,11 +12,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.checks import check_count, check_number, check_type
+from icub_jump_env.checks import check_count, check_number, check_type, store
 
 Array = NDArray[np.float64]
 
 SensorName = Literal["ideal", "realistic"]
+
+MAX_DELAY = 100
+"""Longest delay (control ticks)."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class SensorError:
 
     def __post_init__(self) -> None:
         for name in ("noise", "bias", "drift"):
-            check_number(name, getattr(self, name), 0.0, 1e4)
+            store(self, **{name: check_number(name, getattr(self, name), 0.0, 1e4)})
 
 
 @dataclass(frozen=True)
@@ -73,8 +76,8 @@ class SensorConfig:
     def __post_init__(self) -> None:
         for name in ERROR_KINDS:
             check_type(name, getattr(self, name), SensorError)
-        check_number("force_gain", self.force_gain, 0.0, 1.0)
-        check_count("delay", self.delay, 0)
+        store(self, force_gain=check_number("force_gain", self.force_gain, 0.0, 1.0))
+        store(self, delay=check_count("delay", self.delay, 0, MAX_DELAY))
 
     def with_noise_of(self, other: SensorConfig, share: float) -> SensorConfig:
         """The same with a ``share`` of another configuration's noise on top (variances add)."""
@@ -118,18 +121,23 @@ SENSORS: Mapping[SensorName, SensorConfig] = MappingProxyType(
 
 
 class ErrorSource:
-    """Draws the errors of one kind of reading."""
+    """Draws the errors of one kind of reading.
+
+    Attributes:
+        bias: Constant offset of each channel.
+        drift: Rate (1/s) of each channel.
+    """
 
     def __init__(self, error: SensorError, size: int, rng: np.random.Generator) -> None:
         """Draw bias and drift of ``size`` channels."""
         self._noise = error.noise
         self._rng = rng
         self.bias: Array = error.bias * rng.uniform(-1.0, 1.0, size)
-        self._drift: Array = error.drift * rng.uniform(-1.0, 1.0, size)
+        self.drift: Array = error.drift * rng.uniform(-1.0, 1.0, size)
 
     def at(self, time: float) -> Array:
         """Errors of one reading at ``time`` (s) since the reset."""
-        error: Array = self.bias + self._drift * time
+        error: Array = self.bias + self.drift * time
         if self._noise > 0.0:
             error += self._noise * self._rng.standard_normal(error.size)
         return error

@@ -14,6 +14,7 @@ from icub_jump_env.robot.mujoco_model import sole_geom
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import World
 from icub_jump_env.simulation.sensor_models import (
+    ERROR_KINDS,
     SENSORS,
     ErrorSource,
     SensorConfig,
@@ -32,7 +33,7 @@ _CHANNELS = {
 }
 
 
-_VIEWS = ("_imu_rotation", "_imu_gyro", "_sole_forces")
+_VIEWS = ("_imu_rotation", "_imu_gyro", "_sole_forces", "_soles")
 
 
 class Sensors:
@@ -79,6 +80,8 @@ class Sensors:
         self._imu_rotation = data.site("imu").xmat.reshape(3, 3)
         self._imu_gyro = data.sensor("base_gyro").data
         self._sole_forces = [data.sensor(f"{side}_sole_force").data for side in "lr"]
+        geoms = [self._physics.model.geom(sole_geom(side)) for side in "lr"]
+        self._soles = [(data.geom_xpos[geom.id], int(geom.bodyid[0])) for geom in geoms]
 
     def __getstate__(self) -> dict[str, Any]:
         # Views of MuJoCo's arrays have to be taken anew from a copy's own data.
@@ -90,13 +93,16 @@ class Sensors:
 
     def reset(self, world: World, seed: int) -> None:
         """Draw the errors of an episode in ``world``; ``seed`` is that of all noise."""
-        rng = np.random.default_rng(seed)
         config = self._config.with_noise_of(SENSORS["realistic"], world.sensor_noise)
+        # A generator for each, so that the errors of one kind do not depend on another's.
         self._errors = {
-            kind: ErrorSource(getattr(config, kind), size, rng)
-            for kind, size in _CHANNELS.items()
+            kind: ErrorSource(
+                getattr(config, kind), _CHANNELS[kind], np.random.default_rng([seed, index])
+            )
+            for index, kind in enumerate(ERROR_KINDS)
             if getattr(config, kind) != SensorError()
         }
+        rng = np.random.default_rng([seed, len(ERROR_KINDS)])
         self._force_gain = config.force_gain * rng.uniform(-1.0, 1.0, 2)
         self._wrong_forces = config.force_gain > 0.0 or not {"force", "moment"}.isdisjoint(
             self._errors
@@ -110,6 +116,17 @@ class Sensors:
         gravity = self._physics.model.opt.gravity
         self._down[:] = gravity / np.linalg.norm(gravity)
         self._history.clear()
+        self.torque_error[:] = 0.0
+
+    def drawn(self) -> dict[str, Any]:
+        """The errors drawn at the reset: bias and drift by kind of reading, plain floats."""
+        return {
+            "force_gain": tuple(self._force_gain.tolist()),
+            **{
+                kind: {"bias": tuple(source.bias.tolist()), "drift": tuple(source.drift.tolist())}
+                for kind, source in self._errors.items()
+            },
+        }
 
     def read(self) -> None:
         """Take new readings."""
@@ -142,14 +159,10 @@ class Sensors:
     def _falsify_forces(self, force_errors: Array, moment_errors: Array) -> None:
         model, data = self._physics.model, self._physics.data
         self.torque_error[:] = 0.0
-        for foot, side in enumerate("lr"):
+        for foot, (center, body) in enumerate(self._soles):
             force = force_errors[foot] + self._force_gain[foot] * self._sole_forces[foot][1:4]
             self.foot_force[foot] += force[2]
-            geom = model.geom(sole_geom(side)).id
-            mujoco.mj_jac(
-                model, data, self._jacobian[:3], self._jacobian[3:],
-                data.geom_xpos[geom], model.geom_bodyid[geom],
-            )  # fmt: skip
+            mujoco.mj_jac(model, data, self._jacobian[:3], self._jacobian[3:], center, body)
             wrench = np.concatenate((force, moment_errors[foot]))
             self.torque_error -= self._jacobian[:, 6:].T @ wrench
 

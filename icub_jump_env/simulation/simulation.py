@@ -20,10 +20,10 @@ from icub_jump_env.simulation.variation import ModelVariation
 Array = NDArray[np.float64]
 
 SETTLING_TIME = 0.3
-"""Time (s) that a reset lets the soles settle into the floor before the jump starts."""
+"""Time (s) that a reset lets the soles settle into the floor before the jump starts; ours."""
 
 PUSH_DURATION = 0.05
-"""How long the force of a push acts (s)."""
+"""How long the force of a push acts (s); our choice."""
 
 
 class Simulation:
@@ -107,7 +107,7 @@ class Simulation:
         if delay == 0:
             self.actuators.command(command)
             return
-        self._pending.append(command.copy())
+        self._pending.append(command)
         if len(self._pending) > delay:
             self.actuators.command(self._pending.popleft())
 
@@ -117,10 +117,11 @@ class Simulation:
         position = physics.joint_position
         if self.sensors.biased:
             position = position + self.sensors.encoder_bias
-        torque = self.actuators.torque(position, physics.joint_velocity)
+        actuators = self.actuators
+        torque = actuators.torque(position, physics.joint_velocity)
         start, end, force = self._push
         pushing = start <= physics.data.time < end
-        physics.step(torque, force if pushing else 0.0)
+        physics.step(torque, actuators.friction, force if pushing else 0.0)
 
     def sense(self) -> None:
         """Take new readings; call once per control tick."""

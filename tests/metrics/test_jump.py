@@ -236,6 +236,7 @@ def test_metrics_are_plain_floats_and_bools():
 
 def test_undefined_is_a_nan_that_equals_itself():
     undefined = JumpMetrics().takeoff_time
+    assert len({undefined, pickle.loads(pickle.dumps(undefined))}) == 1
     assert isinstance(undefined, float)
     assert math.isnan(undefined)
     assert undefined != undefined
@@ -265,6 +266,15 @@ class TestSlip:
         assert recorder.metrics.sole_slip == 0.0
         stand(recorder, time, 0.2, sole_position=self.soles(0.21))
         assert recorder.metrics.sole_slip == pytest.approx(0.01)
+
+    def test_a_bounce_is_no_slip(self):
+        recorder = JumpRecorder(LIMITS, 0.3)
+        time = stand(recorder, 0.0, 0.4, sole_position=self.soles())
+        landing = ballistic(recorder, time, 0.886, sole_position=self.soles())
+        landing = stand(recorder, landing, 0.05, sole_position=self.soles())
+        landing = ballistic(recorder, landing, 0.2, sole_position=lambda t: self.soles(t))
+        stand(recorder, landing, 0.2, sole_position=self.soles(0.05))
+        assert recorder.metrics.sole_slip == 0.0
 
     def test_a_toppling_robot_moves_its_soles_without_slipping(self):
         recorder = JumpRecorder(LIMITS, 0.3)

@@ -13,7 +13,8 @@ from icub_jump_env.simulation.actuators.servo import JointServo
 Array = NDArray[np.float64]
 
 FRICTION_SPEED = 0.05
-"""Speed (rad/s) over which Coulomb friction builds up: tanh(s_dot / this)."""
+"""Speed (rad/s) over which Coulomb friction builds up: tanh(s_dot / this). Ours: as small as
+the explicit integration at 2 ms bears."""
 
 _NOMINAL = np.ones(facts.N_JOINTS)
 
@@ -22,6 +23,7 @@ class Actuators:
     """Servo or torque loop, then the motor's limits, then friction.
 
     Attributes:
+        friction: (23,) torques that friction takes away (Nm); ``None`` without friction.
         velocity_command: (23,) latest commanded joint velocities (rad/s).
         torque_command: (23,) latest commanded torques (Nm); NaN unless in torque control.
         torque_error: (23,) error of the torque measurement (Nm), set by whoever senses.
@@ -39,15 +41,15 @@ class Actuators:
         Args:
             config: Their models.
             dt: Physics step (s).
-            strength: (23,) share of the torque that the motors really give.
+            strength: (23,) share of their largest torque that the motors reach.
             gain_scale: (23,) factor on the servo gains.
         """
         self._servo = JointServo(dt, config.servo, gain_scale)
         self._loop = config.torque_loop.make(dt)
         self._motor = config.motor.make(strength)
         self._coulomb = config.friction * facts.EFFORT_LIMIT
-        self._has_friction = config.friction > 0.0
-        self._friction = np.zeros(facts.N_JOINTS)
+        self._losses = np.zeros(facts.N_JOINTS)
+        self.friction = self._losses if config.friction > 0.0 else None
         self._joint_torque = np.zeros(facts.N_JOINTS)
         self._torque_control = False
         self.velocity_command = np.zeros(facts.N_JOINTS)
@@ -82,16 +84,16 @@ class Actuators:
             joint_velocity: (23,) rad/s.
 
         Returns:
-            (23,) joint torques (Nm); a buffer that the next call overwrites.
+            (23,) motor torques on the joint side (Nm), from which ``friction`` goes off; a
+            buffer that the next call overwrites.
         """
-        if self._has_friction:
-            np.multiply(
-                self._coulomb, np.tanh(joint_velocity / FRICTION_SPEED), out=self._friction
-            )
+        if self.friction is not None:
+            np.multiply(self._coulomb, np.tanh(joint_velocity / FRICTION_SPEED), out=self.friction)
         if self._torque_control:
             measured = self._joint_torque + self.torque_error
-            motor = self._loop.motor_torque(self.torque_command, measured, self._friction)
+            motor = self._loop.motor_torque(self.torque_command, measured, self._losses)
         else:
             motor = self._servo.torque(self.velocity_command, joint_position, joint_velocity)
         self._motor.limit(motor, joint_velocity)
-        return np.subtract(motor, self._friction, out=self._joint_torque)
+        np.subtract(motor, self._losses, out=self._joint_torque)
+        return motor

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
-from icub_jump_env.checks import check_number, check_type
+from icub_jump_env.checks import check_number, check_type, store
 from icub_jump_env.simulation.actuators.motors import DCMotor, RatedMotor
 from icub_jump_env.simulation.actuators.servo import ServoGains
 from icub_jump_env.simulation.actuators.torque_loops import (
@@ -52,7 +52,7 @@ class ActuatorConfig:
         check_type("servo", self.servo, ServoGains)
         check_type("torque_loop", self.torque_loop, IdealTorque, TorqueFeedback, CurrentControl)
         check_type("motor", self.motor, RatedMotor, DCMotor)
-        check_number("friction", self.friction, 0.0, 0.5)
+        store(self, friction=check_number("friction", self.friction, 0.0, 0.2))
 
 
 ACTUATORS: Mapping[ActuatorName, ActuatorConfig] = MappingProxyType(

@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.checks import check_choice, check_number
+from icub_jump_env.checks import check_choice, check_number, store
 from icub_jump_env.robot import facts
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ class RatedMotor:
 
     Attributes:
         speed_band: Over this share of the speed limit, above it, the available torque
-            falls to zero.
+            falls to zero. Our choice.
         kind: Name of this model.
 
     Raises:
@@ -40,10 +40,10 @@ class RatedMotor:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("rated",))
-        check_number("speed_band", self.speed_band, 1e-3, 1.0)
+        store(self, speed_band=check_number("speed_band", self.speed_band, 1e-3, 1.0))
 
     def make(self, strength: Array) -> Motor:
-        """The motors; ``strength`` is the (23,) share of torque that they give."""
+        """The motors; ``strength`` is the (23,) share of their largest torque that they reach."""
         slope = 1.0 / (self.speed_band * facts.VELOCITY_LIMIT)
         return _TorqueSpeedLine(
             effort=facts.EFFORT_LIMIT * strength,
@@ -82,13 +82,13 @@ class DCMotor:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("dc",))
-        check_number("current_limit", self.current_limit, 0.01, 1.0)
-        check_number("voltage_limit", self.voltage_limit, 0.01, 1.0)
-        check_number("stall_torque", self.stall_torque, 1.0, 100.0)
-        check_number("no_load_speed", self.no_load_speed, 0.1, 10.0)
+        store(self, current_limit=check_number("current_limit", self.current_limit, 0.01, 1.0))
+        store(self, voltage_limit=check_number("voltage_limit", self.voltage_limit, 0.01, 1.0))
+        store(self, stall_torque=check_number("stall_torque", self.stall_torque, 1.0, 100.0))
+        store(self, no_load_speed=check_number("no_load_speed", self.no_load_speed, 0.1, 10.0))
 
     def make(self, strength: Array) -> Motor:
-        """The motors; ``strength`` is the (23,) share of torque that they give."""
+        """The motors; ``strength`` is the (23,) share of their largest torque that they reach."""
         effort = facts.EFFORT_LIMIT * strength
         stall = self.stall_torque * effort
         return _TorqueSpeedLine(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.checks import check_number
+from icub_jump_env.checks import check_number, store
 from icub_jump_env.robot import facts
 
 Array = NDArray[np.float64]
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ServoGains:
-    """Gains of the joint servos.
+    """Gains of the joint servos. Ours: the robot's are not public in these units.
 
     Attributes:
         stiffness: Torque per position error (Nm/rad); in velocity control per
@@ -30,8 +30,8 @@ class ServoGains:
     damping: float = 50.0
 
     def __post_init__(self) -> None:
-        check_number("stiffness", self.stiffness, 1e-3, 1e6)
-        check_number("damping", self.damping, 0.0, 1e5)
+        store(self, stiffness=check_number("stiffness", self.stiffness, 1e-3, 1e6))
+        store(self, damping=check_number("damping", self.damping, 0.0, 1e5))
 
 
 class JointServo:

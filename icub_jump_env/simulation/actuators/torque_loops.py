@@ -10,7 +10,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.checks import check_choice, check_number
+from icub_jump_env.checks import check_choice, check_number, store
 from icub_jump_env.robot import facts
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ class TorqueLoop(Protocol):
 
         Args:
             desired: (23,) joint torques asked for (Nm).
-            measured: (23,) joint torques measured (Nm).
+            measured: (23,) joint torques measured (Nm); the loop may keep the array.
             friction: (23,) joint friction (Nm), for loops that compensate it by model.
 
         Returns:
@@ -62,8 +62,8 @@ class TorqueFeedback:
     Attributes:
         bandwidth: Of the closed loop, f (Hz). Assumption; the paper says that its loops
             "were tuned for less dynamic tasks".
-        delay: Age of the measurement (s). Assumption. The loop is stable while
-            ``2 pi bandwidth delay`` is well below pi / 2.
+        delay: Age of the measurement (s). Assumption. The loop is stable while its product
+            with the bandwidth is below 1/4, with half a physics step added to the delay.
         kind: Name of this model.
 
     Raises:
@@ -76,8 +76,8 @@ class TorqueFeedback:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("feedback",))
-        check_number("bandwidth", self.bandwidth, 0.1, 1000.0)
-        check_number("delay", self.delay, 0.0, 0.1)
+        store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1000.0))
+        store(self, delay=check_number("delay", self.delay, 0.0, 0.1))
 
     def make(self, dt: float) -> TorqueLoop:
         """The loop at a physics step of ``dt`` (s)."""
@@ -110,9 +110,16 @@ class CurrentControl:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("current",))
-        check_number("bandwidth", self.bandwidth, 0.1, 1e4)
-        check_number("friction_compensation", self.friction_compensation, 0.0, 1.5)
-        check_number("torque_constant", self.torque_constant, 0.5, 1.5)
+        store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1e4))
+        store(
+            self,
+            friction_compensation=check_number(
+                "friction_compensation", self.friction_compensation, 0.0, 1.5
+            ),
+        )
+        store(
+            self, torque_constant=check_number("torque_constant", self.torque_constant, 0.5, 1.5)
+        )
 
     def make(self, dt: float) -> TorqueLoop:
         """The loop at a physics step of ``dt`` (s)."""
@@ -133,7 +140,7 @@ class _Ideal:
 
 class _Feedback:
     def __init__(self, config: TorqueFeedback, dt: float) -> None:
-        self._gain = 2 * math.pi * config.bandwidth * dt
+        self._gain = -math.expm1(-2 * math.pi * config.bandwidth * dt)
         self._torque = np.zeros(facts.N_JOINTS)
         self._measured: deque[Array] = deque(maxlen=1 + round(config.delay / dt))
 
@@ -142,7 +149,7 @@ class _Feedback:
         self._measured.extend(torque.copy() for _ in range(self._measured.maxlen or 0))
 
     def motor_torque(self, desired: Array, measured: Array, friction: Array) -> Array:
-        self._measured.append(measured.copy())
+        self._measured.append(measured)
         self._torque += self._gain * (desired - self._measured[0])
         return self._torque
 
