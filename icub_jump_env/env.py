@@ -187,11 +187,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._observe()
         if self.render_mode == "human":
             self.render()
-        drawn = {
-            "world": self._simulation.world.as_dict(),
-            "sensor_errors": self._simulation.sensors.drawn(),
-        }
-        return self._observation.copy(), self._info() | drawn
+        return self._observation.copy(), self._info() | self._simulation.drawn()
 
     def step(
         self, action: NDArray[np.float32]

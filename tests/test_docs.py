@@ -51,6 +51,11 @@ def test_the_preset_tables_are_current():
         assert tables.preset_table(kind) in document
 
 
+def test_the_readme_shows_what_the_command_prints():
+    readme = (REPOSITORY / "README.md").read_text()
+    assert update.output_of("python eval.py") in readme
+
+
 def test_the_readme_shows_the_table_once():
     readme = (REPOSITORY / "README.md").read_text()
     assert readme.count("flight height (CoM), cm") == 1

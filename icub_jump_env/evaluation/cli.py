@@ -7,6 +7,7 @@ import dataclasses
 import io
 import json
 import re
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn, TypeVar, get_args
@@ -62,18 +63,22 @@ def parse(kind: type[T], arguments: Sequence[str]) -> T:
     Raises:
         ConfigError: If a value is out of range.
     """
-    complaint = io.StringIO()
+    # What tyro prints it decorates for a terminal, if it sees one.
+    page = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
     try:
-        with contextlib.redirect_stderr(complaint):
+        with contextlib.redirect_stdout(page), contextlib.redirect_stderr(page):
             return tyro.cli(kind, args=list(arguments), registry=_registry)
     except SystemExit as end:
+        page.seek(0)
         if end.code in (0, None):
+            print(page.read(), end="")
             raise
-        _fail(_one_line(complaint.getvalue()))
+        _fail(_one_line(page.read()))
 
 
 def guarded(main: Callable[[], None]) -> None:
     """Run ``main``; any error that we foresee ends with one line and a non-zero exit."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         main()
     except (ICubJumpError, OSError) as error:
@@ -91,9 +96,9 @@ def evaluate(arguments: Sequence[str]) -> None:
 def _evaluate(options: EvalOptions) -> None:
     import_mujoco()
     # Imported here, like the modes, so that --help and bad arguments answer at once.
-    from icub_jump_env.evaluation.output import check_writable
+    from icub_jump_env.evaluation.output import check_writable, say
 
-    for name in ("json", "video"):
+    for name in ("json", "video", "results"):
         path = getattr(options, name)
         if path is not None:
             check_writable(name, path)
@@ -108,7 +113,7 @@ def _evaluate(options: EvalOptions) -> None:
     _run_mode(options, console, progress)
     if options.video is not None:
         record_video(options.video, options.config, options.seed, progress)
-        console.print(f"wrote {options.video}")
+        say(console, f"wrote {options.video}")
 
 
 def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None:
@@ -130,11 +135,12 @@ def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None
 
             view(options.config, options.seed, console)
         case "report":
+            from icub_jump_env.evaluation.output import say
             from icub_jump_env.evaluation.report import write_report
 
             assert options.report is not None  # else it were another mode
             file = write_report(options.report, options.config, options.seed, progress)
-            console.print(f"wrote {file}")
+            say(console, f"wrote {file}")
         case _:
             from icub_jump_env.evaluation.nominal import print_nominal
 

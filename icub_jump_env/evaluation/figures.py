@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -43,7 +44,8 @@ def draw_figures(
     ours = episodes["with" if config.momentum_control else "without"]
     figure_number = _LAUNCH[config.controller].figure.lower().replace(". ", "")
     robot = realistic(config)
-    robot_episode = run_episode(make_env(traced(robot)), seed, trace=True)
+    with contextlib.closing(make_env(traced(robot))) as env:
+        robot_episode = run_episode(env, seed, trace=True)
     files = []
     for name, figure in (
         ("fig1_com_reference", com_reference_figure(config)),

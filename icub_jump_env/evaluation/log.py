@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.failures import Failure
 from icub_jump_env.evaluation.output import strict_json, write_file
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.metrics.jump import UNDEFINED
+from icub_jump_env.metrics.jump import UNDEFINED, JumpMetrics
 
 
 class EpisodeLog:
@@ -24,6 +24,7 @@ class EpisodeLog:
     Attributes:
         path: The file.
         episodes: Episodes in it, by seed.
+        kept: Where an existing log was put, if one was in the way.
     """
 
     def __init__(self, path: Path, header: Mapping[str, Any], resume: bool) -> None:
@@ -41,16 +42,22 @@ class EpisodeLog:
         self.path = path
         self.episodes: dict[int, Episode] = {}
         self._header = strict_json(header)
+        self.kept: Path | None = None
+        if resume and not path.exists():
+            raise ConfigError("resume", str(path), "a log that exists")
+        if path.exists():
+            old_header, episodes = self._read()
+            if resume:
+                self._take(old_header, episodes)
+            else:
+                self.kept = _unused(path)
+                path.rename(self.kept)
         path.parent.mkdir(parents=True, exist_ok=True)
-        if resume and path.exists():
-            self._read()
-        elif path.exists():
-            path.rename(_unused(path))
         # Drops half a line at the end as well.
         self._write_sorted()
 
     def append(self, episode: Episode) -> None:
-        """Add an episode; it is on disk when this returns."""
+        """Add an episode; it survives the end of this process."""
         self.episodes[episode.seed] = episode
         with self.path.open("a") as file:
             file.write(_line(episode) + "\n")
@@ -63,18 +70,29 @@ class EpisodeLog:
         lines = [self._header, *(_line(self.episodes[seed]) for seed in sorted(self.episodes))]
         write_file(self.path, "".join(line + "\n" for line in lines).encode())
 
-    def _read(self) -> None:
-        # The last part is empty, or a line that was cut off.
-        *lines, _ = self.path.read_text().split("\n")
+    def _read(self) -> tuple[dict[str, Any], list[Episode]]:
         try:
-            header, *episodes = (json.loads(line) for line in lines)
-            differing = _differences(header, json.loads(self._header))
-            self.episodes = {e.seed: e for e in map(_episode, episodes)}
-        except (ValueError, TypeError, KeyError, AttributeError):
-            raise ConfigError("resume", str(self.path), "a log of eval.py") from None
+            # The last part is empty, or a line that was cut off.
+            *lines, _ = self.path.read_text().split("\n")
+            header, *entries = (json.loads(line) for line in lines)
+            if not isinstance(header, dict) or "episodes" not in header:
+                raise ValueError
+            return header, [_episode(entry) for entry in entries]
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            raise ConfigError(
+                "results", str(self.path), "a log of eval.py, or a new file"
+            ) from None
+
+    def _take(self, old_header: Mapping[str, Any], episodes: Sequence[Episode]) -> None:
+        header = json.loads(self._header)
+        differing = _differences(old_header, header)
+        first = header.get("seed", 0)
+        if not {e.seed for e in episodes} <= set(range(first, first + header["episodes"])):
+            differing.append("seeds")
         if differing:
             allowed = f"a log of the same evaluation; different: {', '.join(differing)}"
             raise ConfigError("resume", str(self.path), allowed)
+        self.episodes = {episode.seed: episode for episode in episodes}
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
@@ -103,15 +121,29 @@ def _line(episode: Episode) -> str:
 
 
 def _episode(entry: dict[str, Any]) -> Episode:
-    failure = entry["failure"]
+    failure, jump = entry["failure"], entry["jump"]
+    if type(entry["seed"]) is not int or type(entry["is_success"]) is not bool:
+        raise TypeError
+    metrics = JumpMetrics().as_dict()
+    if jump.keys() != metrics.keys():
+        raise KeyError
     return Episode(
         seed=entry["seed"],
         outcome=entry["outcome"],
         is_success=entry["is_success"],
-        jump={name: _value(value) for name, value in entry["jump"].items()},
+        jump={name: _like(metrics[name], _value(value)) for name, value in jump.items()},
         failure=None if failure is None else Failure(failure),
         world={name: _value(value) for name, value in entry["world"].items()},
     )
+
+
+def _like(example: Any, value: Any) -> Any:
+    """``value``, refused if it is of another type than the ``example``."""
+    if isinstance(value, float) != isinstance(example, float) or (
+        isinstance(value, bool | tuple | str) and not isinstance(value, type(example))
+    ):
+        raise TypeError
+    return value
 
 
 def _value(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -12,7 +13,7 @@ from rich.console import Console
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import progress_display, write_json
+from icub_jump_env.evaluation.output import progress_display, say, show, write_json
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
 from icub_jump_env.evaluation.table import comparison_rows, render_table, verdict
@@ -58,33 +59,44 @@ def run_nominal(config: JumpConfig, seed: int, trace: bool, console: Console) ->
 def print_nominal(options: EvalOptions, console: Console, progress: Console) -> None:
     """Run eval.py without a mode."""
     config = options.config
+    if options.plot is not None:
+        from icub_jump_env.evaluation.figures import realistic
+
+        realistic(config)  # refuses before any work what Fig. 4 cannot be drawn of
     arms = run_nominal(config, options.seed, trace=options.plot is not None, console=progress)
     ours, other = (arm.episode for arm in arms)
+    wrote = []
+    if options.json is not None:
+        write_json(options.json, nominal_report(arms, options.seed))
+        wrote.append(options.json)
+    if options.plot is not None:
+        wrote += _draw(arms, options, progress)
     rows = comparison_rows(config, ours, other)
     title = (
         f"{config.jump_height * 100:g} cm jump, {config.controller} controller; "
         "the paper's: 4 cm after 11 cm"
     )
-    console.print(render_table(rows, title, config.momentum_control))
-    console.print(verdict(rows, config.momentum_control))
-    if options.json is not None:
-        write_json(options.json, nominal_report(arms, options.seed))
-        console.print(f"wrote {options.json}")
-    if options.plot is not None:
-        from icub_jump_env.evaluation.figures import draw_figures
-        from icub_jump_env.evaluation.snapshots import snapshot_strip
+    show(console, render_table(rows, title, config.momentum_control))
+    say(console, verdict(rows, config.momentum_control))
+    for file in wrote:
+        say(console, f"wrote {file}")
 
-        episodes = {arm.name: arm.episode for arm in arms}
-        files = draw_figures(options.plot, config, episodes, options.seed)
-        try:
-            strip = snapshot_strip(config, options.seed)
-        except MissingDependencyError as error:
-            progress.print(f"left out Fig. 5: {error}", soft_wrap=True)
-        else:
-            files.append(options.plot / "fig5_snapshots.png")
-            strip.savefig(files[-1])
-        for file in files:
-            console.print(f"wrote {file}", soft_wrap=True)
+
+def _draw(arms: Sequence[Arm], options: EvalOptions, progress: Console) -> list[Path]:
+    from icub_jump_env.evaluation.figures import draw_figures
+    from icub_jump_env.evaluation.snapshots import snapshot_strip
+
+    assert options.plot is not None  # else nothing is to be drawn
+    episodes = {arm.name: arm.episode for arm in arms}
+    files = draw_figures(options.plot, options.config, episodes, options.seed)
+    try:
+        strip = snapshot_strip(options.config, options.seed)
+    except MissingDependencyError as error:
+        say(progress, f"left out Fig. 5: {error}")
+    else:
+        files.append(options.plot / "fig5_snapshots.png")
+        strip.savefig(files[-1])
+    return files
 
 
 def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:

@@ -28,6 +28,13 @@ _USED = {
 }
 """Options that each mode uses, beside the common ones and its own."""
 
+_CHOSEN_BY_MODE = {
+    "study": ("controller", "actuators", "sensors", "command_delay"),
+    "sweep": ("controller", "jump_height", "com_displacement", "randomization"),
+    "report": ("controller",),
+}
+"""Fields of the configuration that a mode sets itself."""
+
 
 @dataclass(frozen=True)
 class EvalOptions:
@@ -79,12 +86,24 @@ class EvalOptions:
         chosen = [mode for mode in _MODES if getattr(self, mode)]
         if len(chosen) > 1:
             raise ConfigError(chosen[0], getattr(self, chosen[0]), f"not with --{chosen[1]}")
+        outputs = [
+            path.resolve()
+            for name in ("json", "results", "plot", "video")
+            if (path := getattr(self, name)) is not None
+        ]
+        if len(set(outputs)) < len(outputs):
+            raise ConfigError("json", str(self.json), "another path for each output")
+        for name in _CHOSEN_BY_MODE.get(self.mode, ()):
+            value = getattr(self.config, name)
+            if value != getattr(JumpConfig(), name):
+                raise ConfigError(name, value, f"not with --{self.mode}, which varies it itself")
         used = (*_COMMON, *_USED[self.mode], *chosen)
         for option in dataclasses.fields(self):
             value = getattr(self, option.name)
             if option.name not in used and value != option.default:
                 where = f"--{self.mode}" if chosen else "a single jump that nothing randomises"
-                raise ConfigError(option.name, value, f"not with {where}")
+                shown = str(value) if isinstance(value, Path) else value
+                raise ConfigError(option.name, shown, f"not with {where}")
 
     @property
     def mode(self) -> str:

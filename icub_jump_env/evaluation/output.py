@@ -11,6 +11,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.progress import Progress
+from rich.table import Table
 
 from icub_jump_env.errors import ConfigError
 
@@ -18,6 +19,20 @@ from icub_jump_env.errors import ConfigError
 def progress_display(console: Console) -> Progress:
     """A progress display that vanishes when done, and says nothing to a file or pipe."""
     return Progress(console=console, transient=True, disable=not console.is_terminal)
+
+
+def say(console: Console, text: str) -> None:
+    """Print a line as it is: not wrapped, and nothing in it taken for markup."""
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
+
+
+def show(console: Console, table: Table) -> None:
+    """Print a table whole, however narrow the terminal is."""
+    width = console.width
+    needed = console.measure(table, options=console.options.update(width=1000)).maximum
+    console.width = max(width, needed)
+    console.print(table)
+    console.width = width
 
 
 def check_writable(field: str, path: Path, folder: bool = False) -> None:
@@ -59,10 +74,11 @@ def write_file(path: Path, content: bytes) -> None:
     An existing file stays as it is unless the new one is complete. Links are followed;
     a device such as ``/dev/stdout`` is written to.
     """
-    path = path.resolve()
-    if path.exists() and not path.is_file():
-        path.write_bytes(content)
+    if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):
+        with path.open("ab") as device:
+            device.write(content)
         return
+    path = path.resolve()
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     temporary = Path(name)
     try:

@@ -8,8 +8,10 @@ import itertools
 import logging
 import os
 import secrets
+import signal
 import sys
 import tempfile
+import threading
 from collections.abc import Generator, Iterator, Sequence
 from typing import Any
 
@@ -58,6 +60,16 @@ def run_jobs(work: Work, jobs: int) -> Results:
     """
     jobs = min(jobs, len(work))
     return _run_here(work) if jobs <= 1 else _run_in_workers(_import_ray(), work, jobs)
+
+
+def check_jobs(jobs: int) -> None:
+    """Refuse early if so many jobs cannot run here.
+
+    Raises:
+        MissingDependencyError: If Ray is needed and not installed.
+    """
+    if jobs > 1:
+        _import_ray()
 
 
 def _run_here(work: Work) -> Results:
@@ -134,8 +146,23 @@ def _cluster(ray: Any, jobs: int) -> Iterator[None]:
             _start(ray, jobs, folder)
             yield
         finally:
-            ray.shutdown(wait_for_processes=True)
+            # An impatient second Ctrl-C would leave processes behind.
+            with _uninterrupted():
+                ray.shutdown(wait_for_processes=True)
             ray._private.worker._worker_logs_enabled = True
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Ignore Ctrl-C for the time being, where signals can be handled."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def _start(ray: Any, jobs: int, folder: str) -> None:

@@ -20,8 +20,14 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.failures import Failure
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import progress_display, strict_json, write_json
-from icub_jump_env.evaluation.parallel import run_jobs
+from icub_jump_env.evaluation.output import (
+    progress_display,
+    say,
+    show,
+    strict_json,
+    write_json,
+)
+from icub_jump_env.evaluation.parallel import check_jobs, run_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.table import QUANTITIES, number
@@ -103,11 +109,14 @@ class Statistics:
 def run_statistics(options: EvalOptions, console: Console, progress: Console) -> None:
     """Run eval.py with several episodes or a randomised world."""
     config, episodes = options.config, options.episodes or 1
+    check_jobs(options.jobs)
     log = EpisodeLog(
         options.results or default_log(config, options.seed, episodes),
         {"episodes": episodes, **provenance(config, options.seed)},
         options.resume,
     )
+    if log.kept is not None:
+        say(progress, f"kept the earlier episodes in {log.kept}")
     seeds = range(options.seed, options.seed + episodes)
     missing = [seed for seed in seeds if seed not in log.episodes]
     with progress_display(progress) as display:
@@ -116,29 +125,32 @@ def run_statistics(options: EvalOptions, console: Console, progress: Console) ->
             for _, episode in run_jobs([(config, seed) for seed in missing], options.jobs):
                 log.append(episode)
                 display.advance(task)
-        except KeyboardInterrupt:
+        except BaseException:
             kept = f"{len(log.episodes)} of {episodes} episodes are in {log.path}"
-            progress.print(f"{kept}; add --resume to the command to finish", soft_wrap=True)
+            say(progress, f"{kept}; add --resume to the command to finish")
             raise
     log.finish()
+    say(progress, f"wrote {log.path}")
     done = [log.episodes[seed] for seed in seeds]
     statistics = Statistics.of(done)
-    for renderable in render(statistics, options):
-        console.print(renderable, soft_wrap=isinstance(renderable, str), markup=False)
-    progress.print(f"wrote {log.path}", soft_wrap=True)
     if options.json is not None:
         asked = {"mode": "statistics", "command": command(), "episodes": episodes}
         write_json(
             options.json,
             asked | provenance(config, options.seed) | statistics.as_dict(),
         )
+        say(progress, f"wrote {options.json}")
     if options.plot is not None:
         from icub_jump_env.evaluation.statistics_figure import statistics_figure
 
         options.plot.mkdir(parents=True, exist_ok=True)
         file = options.plot / "statistics.png"
         statistics_figure(done, config.jump_height).savefig(file)
-        console.print(f"wrote {file}", soft_wrap=True)
+        say(progress, f"wrote {file}")
+    title, table, lines = render(statistics, options)
+    say(console, title)
+    show(console, table)
+    say(console, lines)
 
 
 def default_log(config: JumpConfig, seed: int, episodes: int) -> Path:
@@ -150,8 +162,8 @@ def default_log(config: JumpConfig, seed: int, episodes: int) -> Path:
     return Path("results") / f"{config.controller}-{height}-{ranges}-{digest}.jsonl"
 
 
-def render(statistics: Statistics, options: EvalOptions) -> list[Table | str]:
-    """What the terminal shows."""
+def render(statistics: Statistics, options: EvalOptions) -> tuple[str, Table, str]:
+    """What the terminal shows: title, metrics, rates and failures."""
     config = options.config
     ranges = config.randomization if isinstance(config.randomization, str) else "custom"
     title = (
@@ -174,7 +186,7 @@ def render(statistics: Statistics, options: EvalOptions) -> list[Table | str]:
     if statistics.failures:
         seed = next(iter(statistics.failures.values()))[0]
         lines.append(f"replay one: python eval.py {replay_arguments(config, seed)} --view")
-    return [title, table, "\n".join(lines)]
+    return title, table, "\n".join(lines)
 
 
 def replay_arguments(config: JumpConfig, seed: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from icub_jump_env.evaluation.failures import Failure
@@ -26,7 +27,7 @@ _MARKERS = {
 
 
 def statistics_figure(episodes: Sequence[Episode], jump_height: float) -> Figure:
-    """Rise and rotation of every episode that flew; failures by class.
+    """Rise and rotation of every episode; failures by class.
 
     Args:
         episodes: The episodes.
@@ -39,7 +40,8 @@ def statistics_figure(episodes: Sequence[Episode], jump_height: float) -> Figure
         if shown:
             axis.plot(
                 [CM * e.jump["flight_height"] for e in shown],
-                [DEG * e.jump["flight_rotation"] for e in shown],
+                # Without a flight there is no rotation.
+                [DEG * np.nan_to_num(e.jump["flight_rotation"]) for e in shown],
                 marker,
                 color=MEASURED if kind is None else DESIRED,
                 ms=4 if kind is None else 7,

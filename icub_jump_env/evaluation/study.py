@@ -18,7 +18,7 @@ from rich.table import Table
 
 from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
-from icub_jump_env.evaluation.output import progress_display, write_json
+from icub_jump_env.evaluation.output import progress_display, say, show, write_json
 from icub_jump_env.evaluation.parallel import run_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
@@ -128,17 +128,22 @@ class CaseResult:
 def run_study(options: EvalOptions, console: Console, progress: Console) -> None:
     """Run ``eval.py --study realism``."""
     results = run_cases(options, progress)
-    console.print(render(results, options))
+    wrote = []
     if options.json is not None:
         write_json(options.json, study_report(results, options))
-        console.print(f"wrote {options.json}")
+        wrote.append(options.json)
     if options.plot is not None:
         from icub_jump_env.evaluation.study_figure import realism_figure
 
         options.plot.mkdir(parents=True, exist_ok=True)
         file = options.plot / "realism.png"
         realism_figure(results).savefig(file)
-        console.print(f"wrote {file}")
+        wrote.append(file)
+    show(console, render(results, options))
+    for path in wrote:
+        say(console, f"wrote {path}")
+    if options.plot is None:
+        say(progress, "for the picture add --plot FOLDER")
 
 
 def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import progress_display, write_json
+from icub_jump_env.evaluation.output import progress_display, say, show, write_json
 from icub_jump_env.evaluation.parallel import run_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
@@ -57,16 +57,22 @@ def run_sweep(options: EvalOptions, console: Console, progress: Console) -> None
         for index, episode in run_jobs(work, options.jobs):
             episodes[cells[index]] = episode
             display.advance(task)
-    for controller in CONTROLLERS:
-        console.print(render(episodes, controller))
+    episodes = {cell: episodes[cell] for cell in cells}  # in this order, whatever the jobs
+    wrote = []
     if options.json is not None:
         write_json(options.json, sweep_report(episodes, options))
-        console.print(f"wrote {options.json}")
+        wrote.append(options.json)
     if options.plot is not None:
         options.plot.mkdir(parents=True, exist_ok=True)
         file = options.plot / "sweep.png"
         sweep_figure(episodes).savefig(file)
-        console.print(f"wrote {file}")
+        wrote.append(file)
+    for controller in CONTROLLERS:
+        show(console, render(episodes, controller))
+    for path in wrote:
+        say(console, f"wrote {path}")
+    if options.plot is None:
+        say(progress, "for the heat maps add --plot FOLDER")
 
 
 def render(episodes: Mapping[Cell, Episode], controller: ControllerName) -> Table:
@@ -91,12 +97,13 @@ def render(episodes: Mapping[Cell, Episode], controller: ControllerName) -> Tabl
 
 
 def sweep_figure(episodes: Mapping[Cell, Episode]) -> Figure:
-    """Heat maps of reached height and rotation; a cross where the robot fell."""
-    figure = Figure(figsize=(10.0, 8.0), dpi=120, layout="constrained")
-    axes = figure.subplots(2, len(CONTROLLERS), sharex=True, sharey=True)
+    """Heat maps of reached height, rotation and landing."""
+    figure = Figure(figsize=(10.0, 11.0), dpi=110, layout="constrained")
+    axes = figure.subplots(3, len(CONTROLLERS), sharex=True, sharey=True)
     shown = (
         ("flight_height", CM, "CoM rise (cm)", "viridis", (0.0, 8.0)),
         ("flight_rotation", DEG, "rotation in flight (deg)", "coolwarm", (-8.0, 8.0)),
+        ("landed", 1.0, "landed (1) or not (0)", "RdYlGn", (-0.5, 1.5)),
     )
     for row, (metric, scale, label, colors, (low, high)) in enumerate(shown):
         for column, controller in enumerate(CONTROLLERS):
@@ -110,18 +117,16 @@ def sweep_figure(episodes: Mapping[Cell, Episode]) -> Figure:
             image = axis.imshow(
                 values, cmap=colors, vmin=low, vmax=high, origin="lower", aspect="auto"
             )
-            for i, height in enumerate(HEIGHTS):
-                for j, displacement in enumerate(DISPLACEMENTS):
-                    landed = episodes[controller, height, displacement].jump["landed"]
-                    bright = metric == "flight_height" and values[i, j] > 5.0
-                    axis.text(
-                        j, i, f"{values[i, j]:.1f}" + ("" if landed else "\nx"),
-                        ha="center", va="center", fontsize=8,
-                        color="black" if bright or metric != "flight_height" else "white",
-                    )  # fmt: skip
+            dark = metric == "flight_height"
+            for (i, j), value in np.ndenumerate(values):
+                axis.text(
+                    j, i, f"{value:.{0 if metric == 'landed' else 1}f}",
+                    ha="center", va="center", fontsize=8,
+                    color="white" if dark and value < 5.0 else "black",
+                )  # fmt: skip
             axis.set_xticks(range(len(DISPLACEMENTS)), [f"{CM * d:.0f}" for d in DISPLACEMENTS])
             axis.set_yticks(range(len(HEIGHTS)), [f"{CM * h:.0f}" for h in HEIGHTS])
-            axis.set_title(f"{label}, {controller} controller; x: fell", fontsize=10)
+            axis.set_title(f"{label}, {controller} controller", fontsize=10)
         figure.colorbar(image, ax=axes[row])
     for axis in axes[-1]:
         axis.set_xlabel("CoM displacement in the launch (cm)")

@@ -74,4 +74,24 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
 
         run_episode(env, seed, on_step=shoot)
     env.close()
-    iio.imwrite(file, frames, fps=max(1, round(config.agent_frequency / SLOW_MOTION)))
+    # Complete or not at all: a full disk or an interrupt leaves an earlier video as it was.
+    part = file.with_name(f".{file.stem}.part{file.suffix}")
+    try:
+        iio.imwrite(part, frames, fps=max(1, round(config.agent_frequency / SLOW_MOTION)))
+        if part.suffix.lower() == ".mp4":
+            _check_movie(part, file, len(frames))
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _check_movie(part: Path, file: Path, pictures: int) -> None:
+    """The encoder is a process of its own, whose failure is not reported."""
+    from imageio_ffmpeg import count_frames_and_secs
+
+    try:
+        written, _ = count_frames_and_secs(str(part))
+    except RuntimeError:
+        written = 0
+    if written != pictures:
+        raise OSError(f"{file}: {written} of {pictures} pictures could be written; disk full?")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,10 @@ class Simulation:
         if world.push != 0.0:
             start = world.push_time * (launch_duration - PUSH_DURATION)
             self._push = start, start + PUSH_DURATION, world.push / PUSH_DURATION
+
+    def drawn(self) -> dict[str, Any]:
+        """What the reset drew: ``world`` and ``sensor_errors``, plain values."""
+        return {"world": self.world.as_dict(), "sensor_errors": self.sensors.drawn()}
 
     def command(self, command: JointCommand) -> None:
         """Send a command on its way; call once per control tick."""

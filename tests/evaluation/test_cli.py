@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import pty
 import subprocess
 import sys
 from pathlib import Path
@@ -40,7 +41,7 @@ def test_prints_the_table_and_writes_json_and_figures(capsys, tmp_path):
     for row in ("flight height", "sole height", "take-off velocity", "take-off time",
                 "ballistic height", "rotation", "base pitch", "landed"):  # fmt: skip
         assert row in out
-    assert "falls" in out or "stands" in out
+    assert "With the momentum constraint (3d) the robot stands; without it, it" in out
 
     content = json.loads(report.read_text(), parse_constant=pytest.fail)
     assert content["config"]["stand_time"] == 0.3
@@ -151,8 +152,13 @@ def test_flags_reach_the_configuration():
         (["--report", "r", "--json", "a.json"], ["json", "--report"]),
         (["--view", "--episodes", "3"], ["episodes", "--view"]),
         (["--study", "realism", "--resume"], ["resume", "--study"]),
+        (["--sweep", "--jump-height", "0.05"], ["jump_height", "--sweep"]),
+        (["--study", "realism", "--sensors", "realistic"], ["sensors", "--study"]),
+        (["--report", "r", "--controller", "torque"], ["controller", "--report"]),
+        (["--episodes", "2", "--json", "a", "--results", "./a"], ["json", "another path"]),
+        (["--episodes", "2", "--results", "."], ["results", "a file, not a folder"]),
         (["--randomization", "extreme"], ["extreme", "mild", "JSON"]),
-        (["--randomization", '{"friction": [1, 0.4]}'], ["friction", "(1, 0.4)", "lower"]),
+        (["--randomization", '{"friction": [1, 0.4]}'], ["friction", "[1, 0.4]", "lower"]),
         (["--actuators", '{"wings": 2}'], ["actuators", "wings"]),
     ],
 )
@@ -213,6 +219,43 @@ def test_options_refuse_with_the_field():
     with pytest.raises(ConfigError) as refusal:
         EvalOptions(episodes=0)
     assert refusal.value.field == "episodes"
+
+
+def test_tables_are_whole_in_a_narrow_terminal(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    _, out, _ = evaluate(capsys, "--stand-time", "0.1")
+    assert "difference" in out
+    assert "\N{HORIZONTAL ELLIPSIS}" not in out
+
+
+def test_refusals_are_one_plain_line_in_a_terminal():
+    """tyro decorates what it prints where it sees a terminal."""
+    terminal, inside = pty.openpty()
+    result = subprocess.run(
+        [sys.executable, str(REPOSITORY / "eval.py"), "--wings", "2"],
+        stdout=inside, stderr=subprocess.PIPE, text=True, check=False,
+    )  # fmt: skip
+    os.close(inside)
+    os.close(terminal)
+    assert result.returncode == 2
+    assert result.stderr == "error: Unrecognized options: --wings, 2\n"
+
+
+def test_paths_are_not_taken_for_markup(capsys, tmp_path):
+    report = tmp_path / "[red]r[" / "q[b].json"
+    report.parent.mkdir()
+    code, out, _ = evaluate(capsys, "--stand-time", "0.1", "--json", str(report))
+    assert code == 0
+    assert f"wrote {report}\n" in out
+
+
+def test_json_is_written_though_nobody_reads_the_table(tmp_path):
+    command = [sys.executable, str(REPOSITORY / "eval.py"), "--stand-time", "0.1", "--json", "j"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    ) as process:
+        process.stdout.close()
+    assert json.loads((tmp_path / "j").read_text())["mode"] == "nominal"
 
 
 def test_eval_py_runs_from_anywhere(tmp_path):

@@ -3,6 +3,11 @@
 import json
 import math
 import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +19,13 @@ from icub_jump_env.evaluation import cli, statistics
 from icub_jump_env.evaluation.failures import Failure
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.evaluation.output import strict_json
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
 from icub_jump_env.evaluation.statistics import Rate, Statistics, replay_arguments
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.simulation.randomization import Randomization
+
+REPOSITORY = Path(__file__).parents[2]
 
 FAST = ["--randomization", "full", "--stand-time", "0.0"]
 
@@ -94,7 +102,9 @@ class TestLog:
     def test_an_existing_log_is_kept(self, tmp_path):
         path = tmp_path / "log.jsonl"
         for seed in range(3):
-            EpisodeLog(path, self.header, resume=False).append(episode(seed))
+            log = EpisodeLog(path, self.header, resume=False)
+            log.append(episode(seed))
+        assert log.kept == tmp_path / "log.2.jsonl"
         assert set(EpisodeLog(path, self.header, resume=True).episodes) == {2}
         for seed in range(2):
             kept = EpisodeLog(tmp_path / f"log.{seed + 1}.jsonl", self.header, resume=True)
@@ -113,9 +123,45 @@ class TestLog:
     def test_another_file_is_refused_and_kept(self, tmp_path, content):
         path = tmp_path / "notes.txt"
         path.write_text(content)
-        with pytest.raises(ConfigError, match="resume"):
-            EpisodeLog(path, self.header, resume=True)
+        for resume in (True, False):
+            with pytest.raises(ConfigError, match=r"a log of eval\.py"):
+                EpisodeLog(path, self.header, resume=resume)
         assert path.read_text() == content
+        assert list(tmp_path.iterdir()) == [path]
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"seed": "1"}, {"is_success": "no"}, {"jump": {}}, {"failure": "tired"},
+            {"jump": {**JumpMetrics().as_dict(), "flight_height": "high"}},
+            {"jump": {**JumpMetrics().as_dict(), "landed": None}},
+        ],
+    )  # fmt: skip
+    def test_damaged_episodes_are_refused(self, tmp_path, change):
+        log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
+        log.append(episode(0))
+        header, line = log.path.read_text().splitlines()
+        damaged = strict_json(json.loads(line) | change)
+        log.path.write_text(f"{header}\n{damaged}\n")
+        with pytest.raises(ConfigError, match=r"a log of eval\.py"):
+            EpisodeLog(log.path, self.header, resume=True)
+
+    def test_bytes_that_are_no_text_are_refused(self, tmp_path):
+        path = tmp_path / "log.jsonl"
+        path.write_bytes(b"\xff\xfe\n")
+        with pytest.raises(ConfigError, match=r"a log of eval\.py"):
+            EpisodeLog(path, self.header, resume=True)
+
+    def test_episodes_of_other_seeds_are_refused(self, tmp_path):
+        log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
+        log.append(episode(7))
+        with pytest.raises(ConfigError, match="different: seeds"):
+            EpisodeLog(log.path, self.header, resume=True)
+
+    def test_nothing_to_resume_is_refused(self, tmp_path):
+        with pytest.raises(ConfigError, match="a log that exists"):
+            EpisodeLog(tmp_path / "log.jsonl", self.header, resume=True)
+        assert not list(tmp_path.iterdir())
 
 
 def evaluate(capsys, *arguments):
@@ -204,6 +250,38 @@ class TestCommand:
         header = json.loads(log.read_text().splitlines()[0])
         recorded = EpisodeLog(log, header, resume=True).episodes[options.seed]
         assert replayed == recorded
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_killed_and_resumed_equals_uninterrupted(tmp_path, jobs):
+    """The real thing: signals to a process, and the files compared byte for byte."""
+    if jobs == "2":
+        pytest.importorskip("ray")
+    command = [
+        sys.executable, str(REPOSITORY / "eval.py"), "--randomization", "hard", "--sensors",
+        "realistic", "--stand-time", "0.0", "--episodes", "24", "--jobs", jobs, "--results",
+    ]  # fmt: skip
+    whole, parts = tmp_path / "whole.jsonl", tmp_path / "parts.jsonl"
+    subprocess.run([*command, str(whole)], check=True, capture_output=True)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+        resume = ["--resume"] if parts.exists() else []
+        before = len(parts.read_text().splitlines()) if resume else 0
+        with subprocess.Popen(
+            [*command, str(parts), *resume],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        ) as process:  # fmt: skip
+            while not parts.exists() or len(parts.read_text().splitlines()) < before + 3:
+                assert process.poll() is None, process.stderr.read()
+                time.sleep(0.02)
+            process.send_signal(number)
+            _, err = process.communicate(timeout=60)
+        assert process.returncode != 0
+        if number == signal.SIGINT:
+            assert "of 24 episodes are in" in err
+            assert "--resume" in err
+            assert "Traceback" not in err
+    subprocess.run([*command, str(parts), "--resume"], check=True, capture_output=True)
+    assert parts.read_bytes() == whole.read_bytes()
 
 
 def test_replay_arguments_give_the_configuration_back():
