@@ -15,6 +15,7 @@ from icub_jump_env.errors import ConfigError
 
 STUDY_EPISODES = 20
 """Episodes of each case of a study, where errors and noise are drawn anew."""
+MOST_EPISODES = 1_000_000
 
 _MODES = ("study", "sweep", "report", "view")
 _COMMON = ("config", "seed")
@@ -80,7 +81,7 @@ class EvalOptions:
 
     def __post_init__(self) -> None:
         if self.episodes is not None:
-            check_count("episodes", self.episodes, 1)
+            check_count("episodes", self.episodes, 1, MOST_EPISODES)
         check_count("seed", self.seed, 0)
         check_count("jobs", self.jobs, 1)
         chosen = [mode for mode in _MODES if getattr(self, mode)]

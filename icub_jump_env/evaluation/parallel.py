@@ -13,7 +13,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Iterator, Sequence
-from typing import Any
+from typing import Any, Self
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
@@ -32,6 +32,10 @@ _RAY_SETTINGS = {
     "RAY_AUTH_TOKEN": secrets.token_hex(32),  # else Ray leaves one in ~/.ray
 }
 """Read when Ray is imported; those that the user has set remain."""
+
+
+_PATIENCE = 0.2
+"""How long (s) to wait for a result before looking for an interrupt."""
 
 
 class WorkerError(ICubJumpError, RuntimeError):
@@ -87,19 +91,51 @@ def _run_in_workers(ray: Any, work: Work, jobs: int) -> Results:
         for index, (config, seed) in itertools.islice(queue, count):
             running[task.remote(config, seed)] = index
 
-    with _cluster(ray, jobs):
+    with _cluster(ray, jobs), _Interrupts() as interrupts:
         # A dead worker is a failure to report, not to retry.
         task = ray.remote(num_cpus=1, max_retries=0)(_run_in_worker)
         try:
             submit(jobs)
             while running:
-                (done,), _ = ray.wait(list(running), num_returns=1)
-                index = running.pop(done)
-                submit(1)
-                yield index, _result(ray, done, seed=work[index][1])
+                interrupts.check()
+                finished, _ = ray.wait(list(running), num_returns=1, timeout=_PATIENCE)
+                for done in finished:
+                    index = running.pop(done)
+                    submit(1)
+                    yield index, _result(ray, done, seed=work[index][1])
         finally:
             for unfinished in running:
                 ray.cancel(unfinished, force=True)
+
+
+class _Interrupts:
+    """Notes Ctrl-C and SIGTERM instead of obeying at once, which crashes Ray if it is busy."""
+
+    def __init__(self) -> None:
+        self._seen = False
+        self._previous: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._previous[number] = signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)
+
+    def _note(self, *_: object) -> None:
+        self._seen = True
+
+    def check(self) -> None:
+        """Obey now.
+
+        Raises:
+            KeyboardInterrupt: If one was noted.
+        """
+        if self._seen:
+            raise KeyboardInterrupt
 
 
 def _result(ray: Any, done: Any, seed: int) -> Episode:

@@ -31,6 +31,7 @@ from icub_jump_env.evaluation.parallel import check_jobs, run_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.table import QUANTITIES, number
+from icub_jump_env.simulation.sensor_models import SensorConfig
 
 CONFIDENCE = 0.95
 
@@ -110,6 +111,8 @@ def run_statistics(options: EvalOptions, console: Console, progress: Console) ->
     """Run eval.py with several episodes or a randomised world."""
     config, episodes = options.config, options.episodes or 1
     check_jobs(options.jobs)
+    if not config.randomization_config.varies and config.sensor_config == SensorConfig():
+        say(progress, "nothing is random here: all episodes will be alike")
     log = EpisodeLog(
         options.results or default_log(config, options.seed, episodes),
         {"episodes": episodes, **provenance(config, options.seed)},

@@ -127,7 +127,8 @@ def sweep_figure(episodes: Mapping[Cell, Episode]) -> Figure:
             axis.set_xticks(range(len(DISPLACEMENTS)), [f"{CM * d:.0f}" for d in DISPLACEMENTS])
             axis.set_yticks(range(len(HEIGHTS)), [f"{CM * h:.0f}" for h in HEIGHTS])
             axis.set_title(f"{label}, {controller} controller", fontsize=10)
-        figure.colorbar(image, ax=axes[row])
+        if metric != "landed":
+            figure.colorbar(image, ax=axes[row])
     for axis in axes[-1]:
         axis.set_xlabel("CoM displacement in the launch (cm)")
     for axis in axes[:, 0]:

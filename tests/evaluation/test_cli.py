@@ -138,7 +138,7 @@ def test_flags_reach_the_configuration():
         (["--residual-scale", "1"], ["--residual-scale", "3"]),
         (["--timestep", "nan"], ["timestep", "nan"]),
         (["--control-frequency", "333"], ["control_frequency", "333", "divisor"]),
-        (["--episodes", "0"], ["episodes", "0", "from 1"]),
+        (["--episodes", "0"], ["episodes", "0", "from 1 to 1000000"]),
         (["--seed", "-1"], ["seed", "-1", "from 0"]),
         (["--com-scaling", "acceleration", "--jump-height", "0.1"], ["jump_height", "at most"]),
         (["--json", "/nowhere/at/all.json"], ["json", "/nowhere/at/all.json", "folder"]),

@@ -246,6 +246,19 @@ def test_undefined_is_a_nan_that_equals_itself():
     assert json.dumps(undefined) == "NaN"
 
 
+def test_a_higher_second_flight_starts_the_standing_anew():
+    recorder = JumpRecorder(LIMITS, 0.3)
+    time = stand(recorder, 0.0, 0.4)
+    landing = ballistic(recorder, time, 0.5)
+    time = stand(recorder, landing, 0.1)
+    assert recorder.touchdown_time == pytest.approx(landing)
+    for step in range(100):
+        recorder.update(state(time + step * DT, 0.6 + 0.001 * step, force=0.0))
+    assert math.isnan(recorder.touchdown_time)
+    stand(recorder, time + 100 * DT, 0.25)
+    assert not recorder.stood
+
+
 class TestSlip:
     def soles(self, x=0.0, y=0.0):
         return np.array([x, 0.07 + y, 0.0]), np.array([0.0, -0.07, 0.0])
