@@ -52,8 +52,16 @@ def test_the_preset_tables_are_current():
 
 
 def test_the_readme_shows_what_the_command_prints():
+    """To a few units of the last digit: other processors round differently."""
     readme = (REPOSITORY / "README.md").read_text()
-    assert update.output_of("python eval.py") in readme
+    shown = re.search(r"<!-- python eval\.py -->\n```\n(.*?)```", readme, re.DOTALL)[1].split()
+    printed = update.output_of("python eval.py").split()
+    assert len(shown) == len(printed)
+    for ours, theirs in zip(shown, printed, strict=True):
+        try:
+            assert float(ours) == pytest.approx(float(theirs), rel=0.01, abs=0.11)
+        except ValueError:
+            assert ours == theirs
 
 
 def test_the_readme_shows_the_table_once():
