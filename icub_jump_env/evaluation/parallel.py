@@ -15,9 +15,12 @@ import threading
 from collections.abc import Generator, Iterator, Sequence
 from typing import Any, Self
 
+from rich.console import Console
+
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ICubJumpError, MissingDependencyError
+from icub_jump_env.evaluation.output import progress_display
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
 
 Work = Sequence[tuple[JumpConfig, int]]
@@ -64,6 +67,21 @@ def run_jobs(work: Work, jobs: int) -> Results:
     """
     jobs = min(jobs, len(work))
     return _run_here(work) if jobs <= 1 else _run_in_workers(_import_ray(), work, jobs)
+
+
+def run_all(work: Work, jobs: int, console: Console) -> list[Episode]:
+    """Run episodes as :func:`run_jobs` does, with a progress display on ``console``.
+
+    Returns:
+        The episodes, in the order of ``work``.
+    """
+    with progress_display(console) as display:
+        task = display.add_task("jumping", total=len(work))
+        episodes = {}
+        for index, episode in run_jobs(work, jobs):
+            episodes[index] = episode
+            display.advance(task)
+    return [episodes[index] for index in range(len(work))]
 
 
 def check_jobs(jobs: int) -> None:

@@ -160,18 +160,21 @@ def default_log(config: JumpConfig, seed: int, episodes: int) -> Path:
     """Where the episodes of an evaluation go: readable, and another file for another one."""
     asked = strict_json([dataclasses.asdict(config), seed, episodes])
     digest = hashlib.sha256(asked.encode()).hexdigest()[:8]
-    ranges = config.randomization if isinstance(config.randomization, str) else "custom"
     height = f"{100 * config.jump_height:g}cm"
-    return Path("results") / f"{config.controller}-{height}-{ranges}-{digest}.jsonl"
+    name = f"{config.controller}-{height}-{_ranges(config)}-{digest}.jsonl"
+    return Path("results") / name
+
+
+def _ranges(config: JumpConfig) -> str:
+    return config.randomization if isinstance(config.randomization, str) else "custom"
 
 
 def render(statistics: Statistics, options: EvalOptions) -> tuple[str, Table, str]:
     """What the terminal shows: title, metrics, rates and failures."""
     config = options.config
-    ranges = config.randomization if isinstance(config.randomization, str) else "custom"
     title = (
         f"{100 * config.jump_height:g} cm jump, {config.controller} controller, "
-        f"randomization {ranges}, seeds {options.seed} to "
+        f"randomization {_ranges(config)}, seeds {options.seed} to "
         f"{options.seed + statistics.landed.total - 1}"
     )
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)

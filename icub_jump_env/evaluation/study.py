@@ -18,8 +18,8 @@ from rich.table import Table
 
 from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
-from icub_jump_env.evaluation.output import progress_display, say, show, write_json
-from icub_jump_env.evaluation.parallel import run_jobs
+from icub_jump_env.evaluation.output import say, show, write_json
+from icub_jump_env.evaluation.parallel import run_all
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.statistics import Statistics
@@ -157,11 +157,8 @@ def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
                 work.append((config, seed))
                 owners.append((index, controller))
     episodes: dict[tuple[int, ControllerName], list[Episode]] = {o: [] for o in owners}
-    with progress_display(progress) as display:
-        task = display.add_task("jumping", total=len(work))
-        for index, episode in run_jobs(work, options.jobs):
-            episodes[owners[index]].append(episode)
-            display.advance(task)
+    for owner, episode in zip(owners, run_all(work, options.jobs, progress), strict=True):
+        episodes[owner].append(episode)
     return [
         CaseResult(case, {c: Statistics.of(episodes[index, c]) for c in CONTROLLERS})
         for index, case in enumerate(all_cases)

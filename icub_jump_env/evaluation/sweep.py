@@ -14,8 +14,8 @@ from rich.table import Table
 
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import progress_display, say, show, write_json
-from icub_jump_env.evaluation.parallel import run_jobs
+from icub_jump_env.evaluation.output import say, show, write_json
+from icub_jump_env.evaluation.parallel import run_all
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.study import CONTROLLERS
@@ -51,13 +51,7 @@ def run_sweep(options: EvalOptions, console: Console, progress: Console) -> None
         )
         for controller, height, displacement in cells
     ]
-    episodes: dict[Cell, Episode] = {}
-    with progress_display(progress) as display:
-        task = display.add_task("jumping", total=len(work))
-        for index, episode in run_jobs(work, options.jobs):
-            episodes[cells[index]] = episode
-            display.advance(task)
-    episodes = {cell: episodes[cell] for cell in cells}  # in this order, whatever the jobs
+    episodes = dict(zip(cells, run_all(work, options.jobs, progress), strict=True))
     wrote = []
     if options.json is not None:
         write_json(options.json, sweep_report(episodes, options))

@@ -72,7 +72,7 @@ class Sensors:
         self._jacobian = np.zeros((6, physics.model.nv))
         self._errors: dict[str, ErrorSource] = {}
         self._force_gain = np.zeros(2)
-        self._wrong = self._wrong_forces = False
+        self._wrong_forces = False
         self._history: deque[tuple[Array, ...]] = deque(maxlen=1 + config.delay)
 
     def _bind(self) -> None:
@@ -107,7 +107,6 @@ class Sensors:
         self._wrong_forces = config.force_gain > 0.0 or not {"force", "moment"}.isdisjoint(
             self._errors
         )
-        self._wrong = self._wrong_forces or bool(self._errors)
         self.encoder_bias[:] = world.encoder_bias
         if "joint_position" in self._errors:
             self.encoder_bias += self._errors["joint_position"].bias
@@ -137,7 +136,7 @@ class Sensors:
         self.gyro[:] = self._imu_gyro
         for foot, force in enumerate(self._sole_forces):
             self.foot_force[foot] = force[3]
-        if self._wrong:
+        if self._errors or self._wrong_forces:
             self._falsify()
         if self._config.delay:
             self._postpone()
