@@ -30,7 +30,7 @@ from icub_jump_env.evaluation.output import (
 from icub_jump_env.evaluation.parallel import check_jobs, run_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.table import QUANTITIES, number
+from icub_jump_env.evaluation.table import CM, QUANTITIES, number
 from icub_jump_env.simulation.sensor_models import SensorConfig
 
 CONFIDENCE = 0.95
@@ -69,6 +69,7 @@ class Statistics:
     Attributes:
         success: At least 0.7 of the commanded height, and landed.
         landed: Landed and stands.
+        mean_rise: Mean flight height of all episodes (m).
         percentiles: 10th, 50th and 90th percentile of each metric, SI units, over the
             episodes where it is defined; NaN if there is none.
         failures: Seeds of the failed episodes by class.
@@ -76,6 +77,7 @@ class Statistics:
 
     success: Rate
     landed: Rate
+    mean_rise: float
     percentiles: Mapping[str, tuple[float, float, float]]
     failures: Mapping[Failure, tuple[int, ...]]
 
@@ -95,6 +97,7 @@ class Statistics:
         return cls(
             success=Rate(sum(e.is_success for e in episodes), total),
             landed=Rate(sum(bool(e.jump["landed"]) for e in episodes), total),
+            mean_rise=float(np.mean(sorted(e.jump["flight_height"] for e in episodes))),
             percentiles=percentiles,
             failures={kind: seeds for kind, seeds in failures.items() if seeds},
         )
@@ -104,7 +107,11 @@ class Statistics:
         return {
             name: {"count": rate.count, "total": rate.total, "interval": rate.interval}
             for name, rate in (("success", self.success), ("landed", self.landed))
-        } | {"percentiles": self.percentiles, "failures": self.failures}
+        } | {
+            "mean_rise": self.mean_rise,
+            "percentiles": self.percentiles,
+            "failures": self.failures,
+        }
 
 
 def run_statistics(options: EvalOptions, console: Console, progress: Console) -> None:
@@ -185,7 +192,11 @@ def render(statistics: Statistics, options: EvalOptions) -> tuple[str, Table, st
         if metric != "landed":
             values = (number(scale * value, unit) for value in statistics.percentiles[metric])
             table.add_row(f"{name}, {unit}", *values)
-    lines = [f"landed and stands: {statistics.landed}", f"success: {statistics.success}"]
+    lines = [
+        f"landed and stands: {statistics.landed}",
+        f"mean rise: {number(CM * statistics.mean_rise, 'cm')} cm",
+        f"success: {statistics.success}",
+    ]
     for kind, seeds in statistics.failures.items():
         shown = ", ".join(map(str, seeds[:10])) + (", ..." if len(seeds) > 10 else "")
         lines.append(f"{kind}: {len(seeds)} (seeds {shown})")

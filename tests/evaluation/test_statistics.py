@@ -56,6 +56,7 @@ class TestStatistics:
         found = Statistics.of(episodes)
         assert (found.landed.count, found.success.count) == (20, 19)
         assert found.percentiles["flight_height"] == pytest.approx((0.032, 0.04, 0.048))
+        assert found.mean_rise == pytest.approx(0.04)
         assert found.failures == {Failure.TOO_LOW: (3,), Failure.FELL_BACKWARD: (8,)}
         assert Statistics.of(episodes[::-1]) == found
 
@@ -182,7 +183,7 @@ class TestCommand:
         )
         assert code == 0
         for words in ("landed and stands: 100.0 % (3 of 3; 95 % interval 43.9 to 100.0 %)",
-                      "success:", "10 %", "median", "flight height", "seeds 5 to 7"):  # fmt: skip
+                      "mean rise: 3.", "success:", "10 %", "median", "flight height", "seeds 5 to 7"):  # fmt: skip
             assert words in out
         content = json.loads(report.read_text(), parse_constant=pytest.fail)
         assert content["landed"]["count"] == 3
