@@ -56,7 +56,7 @@ def check_numbers(
     """Refuse anything but ``length`` numbers from ``low`` to ``high``."""
     allowed = f"{length} numbers from {low:g} to {high:g}"
     # An array without axes has no length.
-    listed = isinstance(values, Sequence | np.ndarray) and np.ndim(values) > 0
+    listed = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
     if not listed or len(values) != length:
         raise ConfigError(field, values, allowed)
     try:

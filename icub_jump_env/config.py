@@ -7,12 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Self, TypeVar, get_args, get_type_hints
 
+import numpy as np
+
 from icub_jump_env.checks import (
     check_choice,
     check_count,
     check_flag,
     check_number,
     check_numbers,
+    check_range,
     is_multiple,
 )
 from icub_jump_env.control.solvers import SolverName
@@ -38,6 +41,7 @@ from icub_jump_env.simulation.sensor_models import (
 T = TypeVar("T")
 
 ControllerName = Literal["velocity", "torque"]
+ResidualPhases = Literal["launch", "all"]
 RenderMode = Literal["rgb_array", "human"]
 
 CONTROL_RATES: dict[ControllerName, float] = {"velocity": 200.0, "torque": 500.0}
@@ -57,7 +61,8 @@ class JumpConfig:
 
     Attributes:
         controller: Controller of the launching phase.
-        jump_height: Commanded rise of the CoM in flight (m).
+        jump_height: Commanded rise of the CoM in flight (m); lowest and highest, if each
+            episode draws its own.
         com_displacement: Rise of the CoM in the launching phase (m); by default the
             paper's 0.11 with scaling by displacement.
         com_scaling: What fixes the duration of the launch: the CoM displacement, or a
@@ -66,6 +71,9 @@ class JumpConfig:
         solver: QP solver.
         residual_scale: Largest offset of the CoM reference that an action can ask for:
             forward, lateral, vertical (m).
+        residual_phases: When the residual acts: in the launch alone, where it moves the CoM
+            reference, or in all phases; in flight and landing it moves the posture, as far as
+            it takes to shift the CoM over resting feet.
         timestep: Physics step (s).
         control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
             default 200 for the velocity controller and 500 for the torque controller.
@@ -86,12 +94,13 @@ class JumpConfig:
     """
 
     controller: ControllerName = "velocity"
-    jump_height: float = 0.04
+    jump_height: float | tuple[float, float] = 0.04
     com_displacement: float | None = None
     com_scaling: ComScaling = "displacement"
     momentum_control: bool = True
     solver: SolverName = "daqp"
     residual_scale: tuple[float, float, float] = (0.06, 0.02, 0.02)
+    residual_phases: ResidualPhases = "launch"
     timestep: float = 0.001
     control_frequency: float | None = None
     agent_frequency: float = 100.0
@@ -106,13 +115,12 @@ class JumpConfig:
     def __post_init__(self) -> None:
         check_choice("controller", self.controller, get_args(ControllerName))
         check_choice("com_scaling", self.com_scaling, get_args(ComScaling))
+        check_choice("residual_phases", self.residual_phases, get_args(ResidualPhases))
         check_choice("solver", self.solver, get_args(SolverName))
         check_choice("render_mode", self.render_mode, (None, *get_args(RenderMode)))
         for field in ("momentum_control", "ankle_shift"):
             self._store(field, check_flag(field, getattr(self, field)))
-        self._store(
-            "jump_height", check_number("jump_height", self.jump_height, *JUMP_HEIGHT_RANGE)
-        )
+        self._store("jump_height", _check_heights(self.jump_height))
         if self.com_displacement is not None:
             self._store(
                 "com_displacement",
@@ -126,7 +134,8 @@ class JumpConfig:
         self._store("stand_time", check_number("stand_time", self.stand_time, *STAND_TIME_RANGE))
         self._check_models()
         self._check_rates()
-        plan_com_trajectory(self.jump_height, self.com_displacement, self.com_scaling)
+        for height in self.jump_heights:
+            plan_com_trajectory(height, self.com_displacement, self.com_scaling)
 
     def _store(self, field: str, value: Any) -> None:
         object.__setattr__(self, field, value)
@@ -166,6 +175,30 @@ class JumpConfig:
                 "agent_frequency", agent, f"a divisor of the control rate of {control:g} Hz"
             )
         self._store("agent_frequency", agent)
+
+    @property
+    def jump_heights(self) -> tuple[float, float]:
+        """Lowest and highest command (m)."""
+        heights = self.jump_height
+        return heights if isinstance(heights, tuple) else (heights, heights)
+
+    @property
+    def commanded_height(self) -> float:
+        """The command (m), where there is only one.
+
+        Raises:
+            ConfigError: If each episode draws its own.
+        """
+        if isinstance(self.jump_height, tuple):
+            raise ConfigError("jump_height", self.jump_height, "a single height here")
+        return self.jump_height
+
+    def draw_height(self, rng: np.random.Generator) -> float:
+        """The command (m) of an episode."""
+        if not isinstance(self.jump_height, tuple):
+            return self.jump_height
+        # A stream of its own: a given command finds the same world as the same one drawn.
+        return rng.spawn(1)[0].uniform(*self.jump_height)
 
     @property
     def actuator_config(self) -> ActuatorConfig:
@@ -232,6 +265,12 @@ class JumpConfig:
             if name != "jump_height":
                 raise ConfigError(f"options[{name!r}]", value, "the only option is 'jump_height'")
         return dataclasses.replace(self, **options)
+
+
+def _check_heights(heights: Any) -> float | tuple[float, float]:
+    if isinstance(heights, list | tuple | np.ndarray):
+        return check_range("jump_height", heights, *JUMP_HEIGHT_RANGE)
+    return check_number("jump_height", heights, *JUMP_HEIGHT_RANGE)
 
 
 def _from_mapping(name: str, values: Mapping[str, Any], kind: type[T]) -> T:

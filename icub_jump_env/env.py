@@ -9,7 +9,6 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from icub_jump_env import observation
 from icub_jump_env.checks import check_action, check_seed
@@ -53,7 +52,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ``Box(-1, 1, (3,), float32)``: target offset of the CoM reference in units of
     ``residual_scale``, forward, lateral and vertical, world frame. A critically damped
     filter turns it into a consistent offset, velocity and acceleration. It acts in the
-    launching phase. One step lasts ``dt`` = 0.01 s by default.
+    launching phase, or in all (``residual_phases``). One step lasts ``dt`` = 0.01 s by
+    default.
 
     ## Observation space
     ``Box(-10, 10, (SIZE,), float32)``: sensor readings, estimates made of them, the
@@ -124,13 +124,17 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         limits = self._joint_limits()
         self._recorder = JumpRecorder(limits, cfg.stand_time)
         self._crouch = facts.crouch(cfg.ankle_shift)
-        crouch_q = self._crouch_configuration()
+        crouch_q = self._estimator.kinematics.configuration(self._crouch)
         self._crouch_qpos = mujoco_qpos(crouch_q)
         self._crouch_torque = holding_torque(crouch_q)
-        self._controller = JumpController(self._make_launch(limits), self._crouch, cfg.control_dt)
+        shift = None
+        if cfg.residual_phases == "all":
+            shift = self._estimator.kinematics.com_shift(facts.LANDING)
+        launch = self._make_launch(limits)
+        self._controller = JumpController(launch, self._crouch, cfg.control_dt, shift)
         self._residual_scale = np.array(cfg.residual_scale)
         self._start_com = np.zeros(3)
-        self._episode = cfg
+        self._jump_height = math.nan
         self._outcome = "not reset"
         self._report = IDLE
         self._observation = np.zeros(observation.SIZE, np.float32)
@@ -171,9 +175,9 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         episode = self.config.with_options(options)
         super().reset(seed=check_seed(seed))
-        self._episode = episode
+        self._jump_height = episode.draw_height(self.np_random)
         trajectory = plan_com_trajectory(
-            episode.jump_height, episode.com_displacement, episode.com_scaling
+            self._jump_height, episode.com_displacement, episode.com_scaling
         )
         self._simulation.reset(
             self.np_random, self._crouch_qpos, self._crouch_torque, trajectory.duration
@@ -207,6 +211,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._outcome == "not reset":
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         action64 = check_action(action)
+        if self.config.residual_phases == "launch" and not self._launching:
+            action64 = np.zeros(3)  # has no effect and costs nothing
         target = action64 * self._residual_scale
         self._report = IDLE
         already_over = self._outcome != "running"
@@ -218,7 +224,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._observe()
         terms = reward_terms(
             self._recorder.metrics,
-            self._episode.jump_height,
+            self._jump_height,
             action64,
             ends=terminated and not already_over,
         )
@@ -237,8 +243,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def snapshot(self) -> Snapshot:
         """True state, reference and command at the present instant, for logs and figures."""
         truth, actuators = self._simulation.truth.read(), self._simulation.actuators
-        launching = self._controller.phases.phase is Phase.LAUNCH
-        reference = self._controller.reference.position if launching else np.full(3, np.nan)
+        reference = self._controller.reference.position if self._launching else np.full(3, np.nan)
         return Snapshot(
             time=truth.time,
             phase=self._controller.phases.phase.name.lower(),
@@ -270,6 +275,10 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._estimate()
         if self.render_mode is not None:
             self._renderer = make_renderer(self._simulation.physics, self.render_mode)
+
+    @property
+    def _launching(self) -> bool:
+        return self._controller.phases.phase is Phase.LAUNCH
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
         simulation = self._simulation
@@ -325,13 +334,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             return "no take-off"
         return "running"
 
-    def _crouch_configuration(self) -> NDArray[np.float64]:
-        """Pinocchio's configuration (30,) of the crouch with the soles on the floor."""
-        kinematics = self._estimator.kinematics
-        kinematics.update(self._crouch)
-        quaternion = Rotation.from_matrix(kinematics.base_rotation).as_quat()
-        return np.concatenate((kinematics.base_position, quaternion, self._crouch))
-
     def _make_launch(self, limits: JointLimits) -> LaunchController:
         cfg, crouch = self.config, self._crouch
         positions = limits.lower_position, limits.upper_position
@@ -356,14 +358,14 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         one_hot = np.zeros(len(Phase))
         one_hot[phase] = 1.0
         com_error = np.zeros(3)
-        if phase is Phase.LAUNCH:
+        if self._launching:
             reference.update(time)
             com_error = estimator.com - reference.position
         values = {
             "phase": one_hot,
             "launch_progress": min(1.0, time / trajectory.duration),
             "time": time,
-            "jump_height": self._episode.jump_height,
+            "jump_height": self._jump_height,
             "com_displacement": trajectory.displacement,
             "takeoff_time": trajectory.duration,
             "joint_position": sensors.joint_position - self._crouch,
@@ -384,12 +386,12 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         metrics, report = self._recorder.metrics, self._report
         return {
             "jump": metrics.as_dict(),
-            "is_success": metrics.is_success(self._episode.jump_height),
+            "is_success": metrics.is_success(self._jump_height),
             "outcome": self._outcome,
             "diverged": self._outcome == "diverged",
             "phase": self._controller.phases.phase.name.lower(),
             "time": float(self._simulation.physics.data.time),
-            "jump_height": self._episode.jump_height,
+            "jump_height": self._jump_height,
             "solver_status": str(report.status),
             "solver_primal_residual": report.residuals.primal,
             "solver_dual_residual": report.residuals.dual,

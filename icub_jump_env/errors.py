@@ -45,3 +45,38 @@ class CommandNotScalableError(ConfigError):
 
 class MissingDependencyError(ICubJumpError, RuntimeError):
     """An optional package or a system library is missing; the message names the remedy."""
+
+
+class PolicyFileError(ICubJumpError, ValueError):
+    """A file of a policy or a checkpoint is missing, damaged, or something else.
+
+    Attributes:
+        path: The file.
+        problem: What is wrong with it, in words.
+    """
+
+    def __init__(self, path: str, problem: str) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = path
+        self.problem = problem
+
+    def __reduce__(self) -> tuple[type[PolicyFileError], tuple[str, str]]:
+        return type(self), (self.path, self.problem)
+
+
+class PolicyMismatchError(ICubJumpError, ValueError):
+    """A policy was made for another environment.
+
+    Attributes:
+        differences: Name of each field that differs, the policy's value, the environment's.
+    """
+
+    def __init__(self, differences: list[tuple[str, Any, Any]]) -> None:
+        found = "; ".join(
+            f"{field}={ours!r} instead of {theirs!r}" for field, theirs, ours in differences
+        )
+        super().__init__(f"the environment is not the policy's: {found}")
+        self.differences = differences
+
+    def __reduce__(self) -> tuple[type[PolicyMismatchError], tuple[list[tuple[str, Any, Any]]]]:
+        return type(self), (self.differences,)

@@ -111,14 +111,23 @@ def encode(values: Mapping[str, NDArray[np.float64] | float]) -> NDArray[np.floa
     return scaled.astype(np.float32)
 
 
+def entry_scales() -> dict[str, float]:
+    """By what each entry is divided; entries by name, in the order of the observation."""
+    return {
+        f"{block.name}.{label}" if label else block.name: block.scale
+        for block in BLOCKS
+        for label in block.labels
+    }
+
+
 def layout_table() -> str:
     """The layout as a Markdown table, one row per entry."""
     rows = ["| index | entry | meaning | unit | frame | divided by |", "|---|---|---|---|---|---|"]
+    entries = list(entry_scales())
     for block in BLOCKS:
-        for offset, label in enumerate(block.labels):
-            entry = f"{block.name}.{label}" if label else block.name
+        for index in range(SLICES[block.name].start, SLICES[block.name].stop):
             rows.append(
-                f"| {SLICES[block.name].start + offset} | `{entry}` | {block.meaning} "
+                f"| {index} | `{entries[index]}` | {block.meaning} "
                 f"| {block.unit} | {block.frame} | {block.scale:g} |"
             )
     return "\n".join(rows)

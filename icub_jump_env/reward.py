@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from icub_jump_env.metrics.jump import JumpMetrics
 
 LANDED_REWARD = 1.0
-HEIGHT_REWARD = 1.0
+HEIGHT_REWARD = 2.0
+"""Most is to be won here: almost every jump lands."""
 ROTATION_COST = 1.0
 """Per rad of flight rotation."""
 RESIDUAL_COST = 0.001
@@ -26,9 +27,9 @@ def reward_terms(
     """The named reward terms.
 
     Three terms come with the last step of an episode: ``reward_landed`` (1 for a robot
-    that landed and stands), ``reward_height`` (share of the commanded height that was
-    reached, at most 1) and ``reward_rotation`` (minus the flight rotation in rad, at
-    least -1). ``reward_residual`` charges each step for the size of the action.
+    that landed and stands), ``reward_height`` (2 for a flight of the commanded height, less
+    in proportion to the distance from it, at least 0) and ``reward_rotation`` (minus the flight rotation in rad, at
+    least -1). ``reward_residual`` charges each step in which the residual acts for its size.
 
     Args:
         metrics: Metrics so far.
@@ -42,7 +43,8 @@ def reward_terms(
     landed = height = rotation = 0.0
     if ends:
         landed = LANDED_REWARD * metrics.landed
-        height = HEIGHT_REWARD * min(1.0, metrics.flight_height / jump_height)
+        error = abs(metrics.flight_height - jump_height) / jump_height
+        height = HEIGHT_REWARD * max(0.0, 1.0 - error)
         if not math.isnan(metrics.flight_rotation):
             rotation = -min(1.0, ROTATION_COST * abs(metrics.flight_rotation))
     return {

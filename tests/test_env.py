@@ -106,7 +106,7 @@ def test_info_of_every_step(env):
             "sole_slip", "chest_lean",
             "flight_height", "apex_height", "sole_height", "flight_rotation",
             "base_pitch_range", "angular_momentum_takeoff", "peak_ground_force", "landed",
-            "solver_failures", "limit_violations",
+            "solver_failures", "limit_violations", "landing_force", "joint_work",
         }  # fmt: skip
 
 
@@ -412,7 +412,7 @@ class TestEpisodeEnd:
     def test_reward_of_a_success(self, env):
         _, rewards, info = rollout(env)
         assert rewards.sum() == pytest.approx(
-            1.0 + min(1.0, info["jump"]["flight_height"] / 0.04)
+            1.0 + 2.0 * (1.0 - abs(info["jump"]["flight_height"] / 0.04 - 1.0))
             - abs(info["jump"]["flight_rotation"])
         )  # fmt: skip
 

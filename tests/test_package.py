@@ -15,11 +15,12 @@ PACKAGE = REPOSITORY / "icub_jump_env"
 LAYERS = (
     ("evaluation",),
     ("env",),
+    ("policy",),
     ("reward", "config", "observation", "snapshot"),
     ("control", "simulation"),
     ("estimation", "reference", "metrics"),
     ("robot",),
-    ("checks",),
+    ("checks", "files"),
     ("errors",),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

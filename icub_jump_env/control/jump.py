@@ -87,17 +87,26 @@ class JumpController:
         trajectory: The planned CoM trajectory of this jump.
     """
 
-    def __init__(self, launch: LaunchController, crouch: Array, dt: float) -> None:
+    def __init__(
+        self,
+        launch: LaunchController,
+        crouch: Array,
+        dt: float,
+        landing_shift: Array | None = None,
+    ) -> None:
         """Set up the controller.
 
         Args:
             launch: Controller of the launching phase.
             crouch: (23,) posture the jump starts from (rad).
             dt: Control period (s).
+            landing_shift: (23, 3) joint displacement (rad) per residual (m) in flight and
+                landing; by default the residual acts in the launching phase alone.
         """
         self._launch = launch
         self._crouch = crouch
         self._dt = dt
+        self._landing_shift = landing_shift
         self.reference = ComReference()
         self.phases = PhaseMachine()
         self.trajectory: ComTrajectory
@@ -134,8 +143,7 @@ class JumpController:
             joint_position: (23,) encoder readings (rad).
             joint_velocity: (23,) encoder readings (rad/s).
             normal_force: Total measured normal force under the feet (N).
-            residual_target: (3,) target offset of the CoM reference (m); acts in the
-                launching phase only.
+            residual_target: (3,) target offset of the CoM reference (m).
 
         Returns:
             The command and how it came about.
@@ -153,6 +161,12 @@ class JumpController:
             goal = landing_posture(self._crouch, self.trajectory.displacement)
             self._flight = MinimumJerk(joint_position.copy(), goal, FLIGHT_MOTION_TIME)
             self._flight_start = time
+            self.reference.residual.reset()
         # An early touch-down does not stop the motion, so that chatter cannot either.
         position, velocity = self._flight.sample(time - self._flight_start)
+        if self._landing_shift is not None:
+            residual = self.reference.residual
+            residual.step(residual_target, self._dt)
+            position = position + self._landing_shift @ residual.offset
+            velocity = velocity + self._landing_shift @ residual.velocity
         return Tick(JointCommand(velocity, position), None)

@@ -10,7 +10,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args
 
 import tyro
 from rich.console import Console
@@ -18,6 +18,9 @@ from rich.console import Console
 from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.opengl import import_mujoco
+
+if TYPE_CHECKING:
+    from icub_jump_env.evaluation.contender import Contender
 
 T = TypeVar("T")
 
@@ -57,8 +60,13 @@ def _name_or_json(
     )
 
 
-def parse(kind: type[T], arguments: Sequence[str]) -> T:
+def parse(kind: type[T], arguments: Sequence[str], default: T | None = None) -> T:
     """Parse a command line into ``kind``; on an error exit with one line.
+
+    Args:
+        kind: A dataclass.
+        arguments: The words of the command line.
+        default: What holds where they say nothing; else the defaults of ``kind``.
 
     Raises:
         ConfigError: If a value is out of range.
@@ -67,7 +75,9 @@ def parse(kind: type[T], arguments: Sequence[str]) -> T:
     page = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
     try:
         with contextlib.redirect_stdout(page), contextlib.redirect_stderr(page):
-            return tyro.cli(kind, args=list(arguments), registry=_registry)
+            if default is None:
+                return tyro.cli(kind, args=list(arguments), registry=_registry)
+            return tyro.cli(kind, args=list(arguments), registry=_registry, default=default)
     except SystemExit as end:
         page.seek(0)
         if end.code in (0, None):
@@ -90,10 +100,11 @@ def guarded(main: Callable[[], None]) -> None:
 
 def evaluate(arguments: Sequence[str]) -> None:
     """Run eval.py with these arguments."""
-    guarded(lambda: _evaluate(parse(EvalOptions, arguments)))
+    guarded(lambda: _evaluate(arguments))
 
 
-def _evaluate(options: EvalOptions) -> None:
+def _evaluate(arguments: Sequence[str]) -> None:
+    options = parse(EvalOptions, arguments)
     import_mujoco()
     # Imported here, like the modes, so that --help and bad arguments answer at once.
     from icub_jump_env.evaluation.output import check_writable, say
@@ -109,19 +120,54 @@ def _evaluate(options: EvalOptions) -> None:
 
         check_video(options.video)
 
+    from icub_jump_env.evaluation.contender import read_contenders
+
+    words = options.compare or (options.policy or "baseline",)
+    contenders = read_contenders([str(word) for word in words])
+    options = _set_up_as_trained(arguments, options, contenders)
     console, progress = Console(), Console(stderr=True)
-    _run_mode(options, console, progress)
+    _run_mode(options, contenders, console, progress)
     if options.video is not None:
-        record_video(options.video, options.config, options.seed, progress)
+        policy = contenders[0].policy
+        record_video(options.video, options.config, options.seed, progress, policy)
         say(console, f"wrote {options.video}")
 
 
-def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None:
+def _set_up_as_trained(
+    arguments: Sequence[str], options: EvalOptions, contenders: Sequence[Contender]
+) -> EvalOptions:
+    """The options with the jump that the policies were trained for, where nothing else is said.
+
+    Raises:
+        PolicyMismatchError: If something else is said that a policy depends on.
+    """
+    from icub_jump_env.evaluation.contender import as_trained
+    from icub_jump_env.policy import check_match
+
+    cards = [contender.card for contender in contenders if contender.card is not None]
+    if not cards:
+        return options
+    config = as_trained(cards[0])
+    if options.compare:
+        config = dataclasses.replace(config, jump_height=cards[0].config.jump_height)
+    options = parse(EvalOptions, arguments, EvalOptions(config=config))
+    for card in cards:
+        check_match(card, options.config)
+    return options
+
+
+def _run_mode(
+    options: EvalOptions, contenders: Sequence[Contender], console: Console, progress: Console
+) -> None:
     match options.mode:
         case "statistics":
             from icub_jump_env.evaluation.statistics import run_statistics
 
-            run_statistics(options, console, progress)
+            run_statistics(options, contenders[0], console, progress)
+        case "compare":
+            from icub_jump_env.evaluation.compare import run_compare
+
+            run_compare(options, contenders, console, progress)
         case "study":
             from icub_jump_env.evaluation.study import run_study
 
@@ -133,7 +179,7 @@ def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None
         case "view":
             from icub_jump_env.evaluation.view import view
 
-            view(options.config, options.seed, console)
+            view(options.config, options.seed, console, policy=contenders[0].policy)
         case "report":
             from icub_jump_env.evaluation.output import say
             from icub_jump_env.evaluation.report import write_report
@@ -144,7 +190,7 @@ def _run_mode(options: EvalOptions, console: Console, progress: Console) -> None
         case _:
             from icub_jump_env.evaluation.nominal import print_nominal
 
-            print_nominal(options, console, progress)
+            print_nominal(options, contenders[0], console, progress)
 
 
 def _one_line(complaint: str) -> str:

@@ -70,7 +70,7 @@ def com_reference_figure(config: JumpConfig) -> Figure:
     acceleration.plot(time, [s.acceleration for s in samples], color=DESIRED)
     _label(acceleration, "vertical CoM acceleration", "m/s²")
     figure.suptitle(
-        f"Fig. 1: CoM reference, {config.jump_height * 100:.3g} cm jump, "
+        f"Fig. 1: CoM reference, {config.commanded_height * 100:.3g} cm jump, "
         f"{trajectory.displacement * 100:.3g} cm displacement"
     )
     return figure
@@ -210,7 +210,9 @@ def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
 
 
 def _trajectory(config: JumpConfig) -> ComTrajectory:
-    return plan_com_trajectory(config.jump_height, config.com_displacement, config.com_scaling)
+    return plan_com_trajectory(
+        config.commanded_height, config.com_displacement, config.com_scaling
+    )
 
 
 def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:

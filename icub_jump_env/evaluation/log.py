@@ -111,8 +111,10 @@ def _line(episode: Episode) -> str:
     return strict_json(
         {
             "seed": episode.seed,
+            "jump_height": episode.jump_height,
             "outcome": episode.outcome,
             "is_success": episode.is_success,
+            "reward": episode.reward,
             "failure": episode.failure,
             "jump": episode.jump,
             "world": episode.world,
@@ -129,8 +131,10 @@ def _episode(entry: dict[str, Any]) -> Episode:
         raise KeyError
     return Episode(
         seed=entry["seed"],
+        jump_height=float(entry["jump_height"]),
         outcome=entry["outcome"],
         is_success=entry["is_success"],
+        reward=float(entry["reward"]),
         jump={name: _like(metrics[name], _value(value)) for name, value in jump.items()},
         failure=None if failure is None else Failure(failure),
         world={name: _value(value) for name, value in entry["world"].items()},

@@ -1,4 +1,7 @@
-"""The default mode of eval.py: the jump with and without the momentum constraint."""
+"""The default mode of eval.py: one jump beside the paper's, and beside another one.
+
+The other one is the jump without the momentum constraint; of a policy, the baseline.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import MissingDependencyError
+from icub_jump_env.evaluation.contender import BASELINE, Contender
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.output import progress_display, say, show, write_json
 from icub_jump_env.evaluation.provenance import command, provenance
@@ -21,49 +25,65 @@ from icub_jump_env.evaluation.table import comparison_rows, render_table, verdic
 
 @dataclass(frozen=True)
 class Arm:
-    """The jump with one setting of the momentum constraint."""
+    """One of the two jumps."""
 
+    name: str
     config: JumpConfig
+    contender: Contender
     episode: Episode
 
-    @property
-    def name(self) -> str:
-        """Whether the momentum constraint is posed."""
-        return "with" if self.config.momentum_control else "without"
 
-
-def run_nominal(config: JumpConfig, seed: int, trace: bool, console: Console) -> tuple[Arm, Arm]:
-    """Jump as configured, and with the momentum constraint switched over.
+def run_nominal(
+    config: JumpConfig,
+    seed: int,
+    trace: bool,
+    console: Console,
+    contender: Contender = BASELINE,
+) -> tuple[Arm, Arm]:
+    """Jump as asked for, and the other jump.
 
     Args:
         config: The jump.
         seed: Seed of both.
         trace: Whether the episodes carry snapshots.
         console: Where the progress is shown.
+        contender: What acts.
 
     Returns:
-        The arm as configured and the other one.
+        The arm as asked for and the other one.
     """
+    if contender.is_baseline:
+        switched = dataclasses.replace(config, momentum_control=not config.momentum_control)
+        jumps = [(_momentum(c), c, contender) for c in (config, switched)]
+    else:
+        jumps = [("policy", config, contender), ("baseline", config, BASELINE)]
     with progress_display(console) as progress:
         task = progress.add_task("jumping", total=2)
         arms = []
-        for momentum_control in (config.momentum_control, not config.momentum_control):
-            arm_config = dataclasses.replace(config, momentum_control=momentum_control)
+        for name, arm_config, acting in jumps:
             env = make_env(traced(arm_config) if trace else arm_config)
-            arms.append(Arm(arm_config, run_episode(env, seed, trace)))
+            hold = arm_config.controls_per_step if trace else 1
+            episode = run_episode(env, seed, acting.policy, trace, hold=hold)
+            arms.append(Arm(name, arm_config, acting, episode))
             env.close()
             progress.advance(task)
     return arms[0], arms[1]
 
 
-def print_nominal(options: EvalOptions, console: Console, progress: Console) -> None:
+def _momentum(config: JumpConfig) -> str:
+    return "with" if config.momentum_control else "without"
+
+
+def print_nominal(
+    options: EvalOptions, contender: Contender, console: Console, progress: Console
+) -> None:
     """Run eval.py without a mode."""
     config = options.config
     if options.plot is not None:
         from icub_jump_env.evaluation.figures import realistic
 
         realistic(config)  # refuses before any work what Fig. 4 cannot be drawn of
-    arms = run_nominal(config, options.seed, trace=options.plot is not None, console=progress)
+    arms = run_nominal(config, options.seed, options.plot is not None, progress, contender)
     ours, other = (arm.episode for arm in arms)
     wrote = []
     if options.json is not None:
@@ -73,11 +93,17 @@ def print_nominal(options: EvalOptions, console: Console, progress: Console) -> 
         wrote += _draw(arms, options, progress)
     rows = comparison_rows(config, ours, other)
     title = (
-        f"{config.jump_height * 100:g} cm jump, {config.controller} controller; "
+        f"{config.commanded_height * 100:g} cm jump, {config.controller} controller; "
         "the paper's: 4 cm after 11 cm"
     )
-    show(console, render_table(rows, title, config.momentum_control))
-    say(console, verdict(rows, config.momentum_control))
+    if contender.is_baseline:
+        show(
+            console,
+            render_table(rows, title, f"{'no' if config.momentum_control else 'with'} eq. 3d"),
+        )
+        say(console, verdict(rows, config.momentum_control))
+    else:
+        show(console, render_table(rows, title, "baseline"))
     for file in wrote:
         say(console, f"wrote {file}")
 
@@ -108,6 +134,7 @@ def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
         **provenance(ours.config, seed),
         "arms": {
             arm.name: {
+                "policy": arm.contender.identity,
                 "momentum_control": arm.config.momentum_control,
                 "outcome": arm.episode.outcome,
                 "is_success": arm.episode.is_success,

@@ -17,15 +17,16 @@ STUDY_EPISODES = 20
 """Episodes of each case of a study, where errors and noise are drawn anew."""
 MOST_EPISODES = 1_000_000
 
-_MODES = ("study", "sweep", "report", "view")
+_MODES = ("compare", "study", "sweep", "report", "view")
 _COMMON = ("config", "seed")
 _USED = {
-    "nominal": ("episodes", "json", "plot", "video"),
-    "statistics": ("episodes", "jobs", "results", "resume", "json", "plot", "video"),
+    "nominal": ("episodes", "policy", "json", "plot", "video"),
+    "statistics": ("episodes", "policy", "jobs", "results", "resume", "json", "plot", "video"),
+    "compare": ("episodes", "jobs", "resume", "json", "plot"),
     "study": ("episodes", "jobs", "json", "plot"),
     "sweep": ("jobs", "json", "plot"),
     "report": (),
-    "view": (),
+    "view": ("policy",),
 }
 """Options that each mode uses, beside the common ones and its own."""
 
@@ -49,6 +50,8 @@ class EvalOptions:
         config: The jump; every field of the environment's configuration is a flag.
         episodes: Number of episodes; in a study, of each case (default 20).
         seed: Seed of the first episode; the next ones count up.
+        policy: Let this policy act; the jump is set up as its card says.
+        compare: Compare policies on the same episodes: files, and the word baseline.
         jobs: Processes that work in parallel (more than 1 needs the extra 'parallel').
         study: How the realism of actuators and sensors changes the jump.
         sweep: Desired height against displacement, for both controllers.
@@ -68,6 +71,8 @@ class EvalOptions:
     config: Annotated[JumpConfig, tyro.conf.arg(name="")] = field(default_factory=JumpConfig)
     episodes: int | None = None
     seed: int = 0
+    policy: Path | None = None
+    compare: tuple[str, ...] | None = None
     jobs: int = 1
     study: Literal["realism"] | None = None
     sweep: bool = False
@@ -87,6 +92,13 @@ class EvalOptions:
         chosen = [mode for mode in _MODES if getattr(self, mode)]
         if len(chosen) > 1:
             raise ConfigError(chosen[0], getattr(self, chosen[0]), f"not with --{chosen[1]}")
+        if self.compare is not None and len(set(self.compare)) < max(2, len(self.compare)):
+            raise ConfigError("compare", self.compare, "two or more policies, each once")
+        several_heights = isinstance(self.config.jump_height, tuple)
+        if several_heights and self.mode not in ("statistics", "compare"):
+            raise ConfigError(
+                "jump_height", self.config.jump_height, f"one height with --{self.mode}"
+            )
         outputs = [
             path.resolve()
             for name in ("json", "results", "plot", "video")
@@ -98,6 +110,9 @@ class EvalOptions:
             value = getattr(self.config, name)
             if value != getattr(JumpConfig(), name):
                 raise ConfigError(name, value, f"not with --{self.mode}, which varies it itself")
+        if self.mode == "nominal" and self.policy is not None and self.plot is not None:
+            # The figures are those of the paper: with the momentum constraint and without.
+            raise ConfigError("plot", str(self.plot), "not with --policy for a single jump")
         used = (*_COMMON, *_USED[self.mode], *chosen)
         for option in dataclasses.fields(self):
             value = getattr(self, option.name)
@@ -113,4 +128,7 @@ class EvalOptions:
             if getattr(self, mode):
                 return mode
         several = self.episodes is not None and self.episodes > 1
-        return "statistics" if several or self.config.randomization_config.varies else "nominal"
+        drawn = self.config.randomization_config.varies or isinstance(
+            self.config.jump_height, tuple
+        )
+        return "statistics" if several or drawn else "nominal"

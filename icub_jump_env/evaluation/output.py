@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.files import strict_json as strict_json
+from icub_jump_env.files import write_file as write_file
 
 
 def progress_display(console: Console) -> Progress:
@@ -61,43 +60,3 @@ def check_writable(field: str, path: Path, folder: bool = False) -> None:
 def write_json(path: Path, content: Any) -> None:
     """Write strict JSON as :func:`write_file` does; NaN, which JSON lacks, becomes null."""
     write_file(path, (strict_json(content, indent=2) + "\n").encode())
-
-
-def strict_json(content: Any, indent: int | None = None) -> str:
-    """``content`` as JSON, with null for NaN."""
-    return json.dumps(_without_nan(content), indent=indent, allow_nan=False)
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Write a file atomically.
-
-    An existing file stays as it is unless the new one is complete. Links are followed;
-    a device such as ``/dev/stdout`` is written to.
-    """
-    if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):
-        with path.open("ab") as device:
-            device.write(content)
-        return
-    path = path.resolve()
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    temporary = Path(name)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -13,7 +13,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Iterator, Sequence
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from rich.console import Console
 
@@ -22,8 +22,18 @@ from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ICubJumpError, MissingDependencyError
 from icub_jump_env.evaluation.output import progress_display
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
+from icub_jump_env.policy import BASELINE, Policy
 
-Work = Sequence[tuple[JumpConfig, int]]
+
+class Job(NamedTuple):
+    """An episode to be run."""
+
+    config: JumpConfig
+    seed: int
+    policy: Policy = BASELINE
+
+
+Work = Sequence[Job]
 Results = Generator[tuple[int, Episode], None, None]
 
 _REMEDY = "several jobs need the extra 'parallel': pip install \"icub-jump[parallel]\" (or ray)"
@@ -53,7 +63,7 @@ def run_jobs(work: Work, jobs: int) -> Results:
     error, ends it.
 
     Args:
-        work: Configuration and seed of each episode. Equal configurations in a row share
+        work: The episodes. Equal configurations in a row share
             an environment.
         jobs: Number of worker processes; 1 runs one episode after the other right here.
 
@@ -95,10 +105,10 @@ def check_jobs(jobs: int) -> None:
 
 
 def _run_here(work: Work) -> Results:
-    for config, episodes in itertools.groupby(enumerate(work), key=lambda item: item[1][0]):
+    for config, jobs in itertools.groupby(enumerate(work), key=lambda item: item[1].config):
         with contextlib.closing(make_env(config)) as env:
-            for index, (_, seed) in episodes:
-                yield index, run_episode(env, seed)
+            for index, job in jobs:
+                yield index, run_episode(env, job.seed, job.policy)
 
 
 def _run_in_workers(ray: Any, work: Work, jobs: int) -> Results:
@@ -106,8 +116,8 @@ def _run_in_workers(ray: Any, work: Work, jobs: int) -> Results:
     running: dict[Any, int] = {}
 
     def submit(count: int) -> None:
-        for index, (config, seed) in itertools.islice(queue, count):
-            running[task.remote(config, seed)] = index
+        for index, job in itertools.islice(queue, count):
+            running[task.remote(job)] = index
 
     with _cluster(ray, jobs), _Interrupts() as interrupts:
         # A dead worker is a failure to report, not to retry.
@@ -120,7 +130,7 @@ def _run_in_workers(ray: Any, work: Work, jobs: int) -> Results:
                 for done in finished:
                     index = running.pop(done)
                     submit(1)
-                    yield index, _result(ray, done, seed=work[index][1])
+                    yield index, _result(ray, done, seed=work[index].seed)
         finally:
             for unfinished in running:
                 ray.cancel(unfinished, force=True)
@@ -166,8 +176,8 @@ def _result(ray: Any, done: Any, seed: int) -> Episode:
     return episode
 
 
-def _run_in_worker(config: JumpConfig, seed: int) -> Episode:
-    return run_episode(_worker_env(config), seed)
+def _run_in_worker(job: Job) -> Episode:
+    return run_episode(_worker_env(job.config), job.seed, job.policy)
 
 
 @functools.lru_cache(maxsize=1)

@@ -16,14 +16,15 @@ _PACKAGES = ("daqp", "gymnasium", "icub-models", "mujoco", "numpy", "osqp", "pin
 
 def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
     """Versions, configuration and seed of a result."""
+    return {"versions": versions(), "config": dataclasses.asdict(config), "seed": seed}
+
+
+def versions(*more: str) -> dict[str, str]:
+    """Versions of Python and of the packages that a result depends on, and of ``more``."""
     return {
-        "versions": {
-            "icub-jump": icub_jump_env.__version__,
-            "python": platform.python_version(),
-            **{package: metadata.version(package) for package in _PACKAGES},
-        },
-        "config": dataclasses.asdict(config),
-        "seed": seed,
+        "icub-jump": icub_jump_env.__version__,
+        "python": platform.python_version(),
+        **{package: metadata.version(package) for package in (*_PACKAGES, *more)},
     }
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,19 +15,19 @@ from rich.table import Table
 from scipy.stats import binomtest
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.contender import Contender
 from icub_jump_env.evaluation.failures import Failure
-from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.output import (
-    progress_display,
     say,
     show,
     strict_json,
     write_json,
 )
-from icub_jump_env.evaluation.parallel import check_jobs, run_jobs
+from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.series import Series, heights, ranges
 from icub_jump_env.evaluation.table import CM, QUANTITIES, number
 from icub_jump_env.simulation.sensor_models import SensorConfig
 
@@ -53,6 +51,10 @@ class Rate:
         """Wilson interval of 95 %."""
         interval = binomtest(self.count, self.total).proportion_ci(CONFIDENCE, method="wilson")
         return float(interval.low), float(interval.high)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"count": self.count, "total": self.total, "interval": self.interval}
 
     def __str__(self) -> str:
         low, high = self.interval
@@ -105,49 +107,38 @@ class Statistics:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            name: {"count": rate.count, "total": rate.total, "interval": rate.interval}
-            for name, rate in (("success", self.success), ("landed", self.landed))
-        } | {
+            "success": self.success.as_dict(),
+            "landed": self.landed.as_dict(),
             "mean_rise": self.mean_rise,
             "percentiles": self.percentiles,
             "failures": self.failures,
         }
 
 
-def run_statistics(options: EvalOptions, console: Console, progress: Console) -> None:
+def run_statistics(
+    options: EvalOptions, contender: Contender, console: Console, progress: Console
+) -> None:
     """Run eval.py with several episodes or a randomised world."""
     config, episodes = options.config, options.episodes or 1
     check_jobs(options.jobs)
-    if not config.randomization_config.varies and config.sensor_config == SensorConfig():
+    low, high = config.jump_heights
+    drawn = config.randomization_config.varies or low < high
+    if not drawn and config.sensor_config == SensorConfig():
         say(progress, "nothing is random here: all episodes will be alike")
-    log = EpisodeLog(
-        options.results or default_log(config, options.seed, episodes),
-        {"episodes": episodes, **provenance(config, options.seed)},
-        options.resume,
+    series = Series(config, range(options.seed, options.seed + episodes), contender)
+    done = series.run(
+        options.results or series.default_log(), options.resume, options.jobs, progress
     )
-    if log.kept is not None:
-        say(progress, f"kept the earlier episodes in {log.kept}")
-    seeds = range(options.seed, options.seed + episodes)
-    missing = [seed for seed in seeds if seed not in log.episodes]
-    with progress_display(progress) as display:
-        task = display.add_task("jumping", total=episodes, completed=episodes - len(missing))
-        try:
-            for _, episode in run_jobs([(config, seed) for seed in missing], options.jobs):
-                log.append(episode)
-                display.advance(task)
-        except BaseException:
-            kept = f"{len(log.episodes)} of {episodes} episodes are in {log.path}"
-            say(progress, f"{kept}; add --resume to the command to finish")
-            raise
-    log.finish()
-    say(progress, f"wrote {log.path}")
-    done = [log.episodes[seed] for seed in seeds]
-    statistics = Statistics.of(done)
     if options.json is not None:
-        asked = {"mode": "statistics", "command": command(), "episodes": episodes}
+        asked = {
+            "mode": "statistics",
+            "command": command(),
+            "episodes": episodes,
+            "policy": contender.identity,
+        }
         write_json(
             options.json,
-            asked | provenance(config, options.seed) | statistics.as_dict(),
+            asked | provenance(config, options.seed) | Statistics.of(done).as_dict(),
         )
         say(progress, f"wrote {options.json}")
     if options.plot is not None:
@@ -155,34 +146,23 @@ def run_statistics(options: EvalOptions, console: Console, progress: Console) ->
 
         options.plot.mkdir(parents=True, exist_ok=True)
         file = options.plot / "statistics.png"
-        statistics_figure(done, config.jump_height).savefig(file)
+        statistics_figure(done).savefig(file)
         say(progress, f"wrote {file}")
-    title, table, lines = render(statistics, options)
+    title, table, lines = render(done, options, contender)
     say(console, title)
     show(console, table)
     say(console, lines)
 
 
-def default_log(config: JumpConfig, seed: int, episodes: int) -> Path:
-    """Where the episodes of an evaluation go: readable, and another file for another one."""
-    asked = strict_json([dataclasses.asdict(config), seed, episodes])
-    digest = hashlib.sha256(asked.encode()).hexdigest()[:8]
-    height = f"{100 * config.jump_height:g}cm"
-    name = f"{config.controller}-{height}-{_ranges(config)}-{digest}.jsonl"
-    return Path("results") / name
-
-
-def _ranges(config: JumpConfig) -> str:
-    return config.randomization if isinstance(config.randomization, str) else "custom"
-
-
-def render(statistics: Statistics, options: EvalOptions) -> tuple[str, Table, str]:
+def render(
+    episodes: Sequence[Episode], options: EvalOptions, contender: Contender
+) -> tuple[str, Table, str]:
     """What the terminal shows: title, metrics, rates and failures."""
-    config = options.config
+    config, statistics = options.config, Statistics.of(episodes)
     title = (
-        f"{100 * config.jump_height:g} cm jump, {config.controller} controller, "
-        f"randomization {_ranges(config)}, seeds {options.seed} to "
-        f"{options.seed + statistics.landed.total - 1}"
+        f"{heights(config)} jump, {config.controller} controller, {contender.name}, "
+        f"randomization {ranges(config)}, seeds {options.seed} to "
+        f"{options.seed + len(episodes) - 1}"
     )
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
@@ -200,9 +180,16 @@ def render(statistics: Statistics, options: EvalOptions) -> tuple[str, Table, st
     for kind, seeds in statistics.failures.items():
         shown = ", ".join(map(str, seeds[:10])) + (", ..." if len(seeds) > 10 else "")
         lines.append(f"{kind}: {len(seeds)} (seeds {shown})")
-    if statistics.failures:
-        seed = next(iter(statistics.failures.values()))[0]
-        lines.append(f"replay one: python eval.py {replay_arguments(config, seed)} --view")
+    failed = [
+        episode for kind in statistics.failures for episode in episodes if episode.failure is kind
+    ]
+    if failed:
+        # In the range of commands it drew this one.
+        jump = dataclasses.replace(config, jump_height=failed[0].jump_height)
+        words = replay_arguments(jump, failed[0].seed)
+        if options.policy is not None:
+            words += f" --policy {shlex.quote(str(options.policy))}"
+        lines.append(f"replay one: python eval.py {words} --view")
     return title, table, "\n".join(lines)
 
 

@@ -26,20 +26,25 @@ _MARKERS = {
 }
 
 
-def statistics_figure(episodes: Sequence[Episode], jump_height: float) -> Figure:
+def statistics_figure(episodes: Sequence[Episode]) -> Figure:
     """Rise and rotation of every episode; failures by class.
+
+    The rise is drawn in units of the command where each episode has its own.
 
     Args:
         episodes: The episodes.
-        jump_height: Commanded height (m).
     """
+    alike = len({e.jump_height for e in episodes}) == 1
+    # A length of 1 on the x axis: a centimetre, or the command.
+    unit = {e.seed: 1 / CM if alike else e.jump_height for e in episodes}
+    command = CM * episodes[0].jump_height if alike else 1.0
     figure = Figure(figsize=(6.5, 4.0), dpi=120, layout="constrained")
     axis = figure.subplots()
     for kind, marker in _MARKERS.items():
         shown = [e for e in episodes if e.failure is kind]
         if shown:
             axis.plot(
-                [CM * e.jump["flight_height"] for e in shown],
+                [e.jump["flight_height"] / unit[e.seed] for e in shown],
                 # Without a flight there is no rotation.
                 [DEG * np.nan_to_num(e.jump["flight_rotation"]) for e in shown],
                 marker,
@@ -47,15 +52,15 @@ def statistics_figure(episodes: Sequence[Episode], jump_height: float) -> Figure
                 ms=4 if kind is None else 7,
                 label=f"{kind or 'success'}: {len(shown)}",
             )
-    axis.axvline(CM * jump_height, color=ACCENT, lw=0.8, label="command")
+    axis.axvline(command, color=ACCENT, lw=0.8, label="command")
     axis.axvline(
-        CM * MIN_HEIGHT_RATIO * jump_height,
+        MIN_HEIGHT_RATIO * command,
         color=ACCENT,
         lw=0.8,
         ls=":",
         label="least for a success",
     )
-    axis.set_xlabel("CoM rise (cm)")
+    axis.set_xlabel("CoM rise (cm)" if alike else "CoM rise / commanded height")
     axis.set_ylabel("rotation in flight (deg)")
     axis.spines[["top", "right"]].set_visible(False)
     axis.legend(frameon=False, fontsize=8)

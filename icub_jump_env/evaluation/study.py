@@ -19,7 +19,7 @@ from rich.table import Table
 from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
 from icub_jump_env.evaluation.output import say, show, write_json
-from icub_jump_env.evaluation.parallel import run_all
+from icub_jump_env.evaluation.parallel import Job, run_all
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.statistics import Statistics
@@ -154,7 +154,7 @@ def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
         for controller in CONTROLLERS:
             config = dataclasses.replace(options.config, controller=controller, **case.changes)
             for seed in _seeds(config, options):
-                work.append((config, seed))
+                work.append(Job(config, seed))
                 owners.append((index, controller))
     episodes: dict[tuple[int, ControllerName], list[Episode]] = {o: [] for o in owners}
     for owner, episode in zip(owners, run_all(work, options.jobs, progress), strict=True):
@@ -175,7 +175,7 @@ def _seeds(config: JumpConfig, options: EvalOptions) -> range:
 def render(results: Sequence[CaseResult], options: EvalOptions) -> Table:
     """The table for the terminal."""
     table = Table(
-        title=f"Realism study, {options.config.jump_height * 100:g} cm jump",
+        title=f"Realism study, {options.config.commanded_height * 100:g} cm jump",
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,

@@ -15,7 +15,7 @@ from rich.table import Table
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.output import say, show, write_json
-from icub_jump_env.evaluation.parallel import run_all
+from icub_jump_env.evaluation.parallel import Job, run_all
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.study import CONTROLLERS
@@ -40,7 +40,7 @@ def run_sweep(options: EvalOptions, console: Console, progress: Console) -> None
         for displacement in DISPLACEMENTS
     ]
     work = [
-        (
+        Job(
             dataclasses.replace(
                 options.config,
                 controller=controller,

@@ -25,7 +25,7 @@ class Row:
         paper: The paper's value, if it gives one.
         ours: Ours as configured.
         difference: Ours minus the paper's.
-        switched: Ours with the momentum constraint switched over.
+        other: That of the jump it is compared with.
         source: Where the paper's value comes from.
     """
 
@@ -34,7 +34,7 @@ class Row:
     paper: float | None
     ours: float
     difference: float | None
-    switched: float
+    other: float
     source: str
 
 
@@ -54,14 +54,14 @@ QUANTITIES = (
 """Quantity, metric and attribute of the paper's result, unit, scale, the paper's source."""
 
 
-def comparison_rows(config: JumpConfig, ours: Episode, switched: Episode) -> list[Row]:
+def comparison_rows(config: JumpConfig, ours: Episode, other: Episode) -> list[Row]:
     """The rows of the table.
 
     Args:
         config: Our configuration. There is a difference to the paper only where it is the
             paper's jump.
         ours: The episode as configured.
-        switched: The episode with the momentum constraint switched over.
+        other: The episode it is compared with.
 
     Returns:
         One row per quantity.
@@ -70,27 +70,24 @@ def comparison_rows(config: JumpConfig, ours: Episode, switched: Episode) -> lis
     same_jump = _plan(config) == _plan(JumpConfig())
     for quantity, key, unit, scale, source in QUANTITIES:
         paper = getattr(PAPER[config.controller], key, None)
-        value, other = (scale * float(episode.jump[key]) for episode in (ours, switched))
+        value, beside = (scale * float(episode.jump[key]) for episode in (ours, other))
         reference = None if paper is None else scale * paper
         difference = None if reference is None or not same_jump else value - reference
-        rows.append(Row(quantity, unit, reference, value, difference, other, source))
+        rows.append(Row(quantity, unit, reference, value, difference, beside, source))
     return rows
 
 
 def _plan(config: JumpConfig) -> ComTrajectory:
-    return plan_com_trajectory(config.jump_height, config.com_displacement, config.com_scaling)
+    return plan_com_trajectory(
+        config.commanded_height, config.com_displacement, config.com_scaling
+    )
 
 
-def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Table:
-    """The table for the terminal; ``momentum_control`` is that of our configuration."""
+def render_table(rows: Sequence[Row], title: str, other: str) -> Table:
+    """The table for the terminal; ``other`` names the last column."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
-    for column in (
-        "paper",
-        "ours",
-        "difference",
-        "no eq. 3d" if momentum_control else "with eq. 3d",
-    ):
+    for column in ("paper", "ours", "difference", other):
         table.add_column(column, justify="right", no_wrap=True)
     for row in rows:
         table.add_row(
@@ -98,7 +95,7 @@ def render_table(rows: Sequence[Row], title: str, momentum_control: bool) -> Tab
             number(row.paper),
             number(row.ours, row.unit),
             number(row.difference, row.unit, signed=True),
-            number(row.switched, row.unit),
+            number(row.other, row.unit),
         )
     table.caption = (
         "paper: simulated heights and landing, commanded take-off, ballistic height of the real "
@@ -113,7 +110,7 @@ def verdict(rows: Sequence[Row], momentum_control: bool) -> str:
     row = next(row for row in rows if row.quantity.startswith("landed"))
     with_, without = (
         "stands" if landed else "falls"
-        for landed in ((row.ours, row.switched) if momentum_control else (row.switched, row.ours))
+        for landed in ((row.ours, row.other) if momentum_control else (row.other, row.ours))
     )
     return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
 

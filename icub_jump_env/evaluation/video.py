@@ -12,6 +12,7 @@ from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.output import progress_display
 from icub_jump_env.evaluation.rollout import make_env, run_episode
+from icub_jump_env.policy import BASELINE, Policy
 from icub_jump_env.simulation.opengl import open_context
 
 SLOW_MOTION = 4
@@ -42,7 +43,9 @@ def check_video(file: Path) -> None:
     open_context(1, 1).free()
 
 
-def record_video(file: Path, config: JumpConfig, seed: int, console: Console) -> None:
+def record_video(
+    file: Path, config: JumpConfig, seed: int, console: Console, policy: Policy = BASELINE
+) -> None:
     """Record one jump in slow motion.
 
     Args:
@@ -50,6 +53,7 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
         config: The jump.
         seed: Seed of the episode.
         console: Where the progress is shown.
+        policy: What acts.
 
     Raises:
         ConfigError: If the file's suffix is no video format.
@@ -72,7 +76,7 @@ def record_video(file: Path, config: JumpConfig, seed: int, console: Console) ->
             frames.append(env.render())
             progress.advance(task)
 
-        run_episode(env, seed, on_step=shoot)
+        run_episode(env, seed, policy, on_step=shoot)
     env.close()
     # Complete or not at all: a full disk or an interrupt leaves an earlier video as it was.
     part = file.with_name(f".{file.stem}.part{file.suffix}")

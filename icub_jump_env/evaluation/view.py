@@ -18,6 +18,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
+from icub_jump_env.policy import BASELINE, Policy
 from icub_jump_env.simulation.viewers.screen import KEYS, Caption, Command, Screen
 from icub_jump_env.simulation.viewers.window import WindowScreen, check_window
 
@@ -112,6 +113,8 @@ class Show:
         enough: threading.Event,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        policy: Policy = BASELINE,
+        hold: int = 1,
     ) -> None:
         """Prepare it.
 
@@ -123,9 +126,13 @@ class Show:
             enough: Another way to quit.
             clock: Tells the time (s).
             sleep: Waits for a time (s).
+            policy: What acts.
+            hold: Steps that an action is held.
         """
         self._env = env
         self._seed = seed
+        self._policy = policy
+        self._hold = hold
         self._screen = screen
         self._playback = playback
         self._enough = enough
@@ -143,7 +150,9 @@ class Show:
         episode = None
         while True:
             try:
-                episode = run_episode(self._env, self._seed, on_step=self._present)
+                episode = run_episode(
+                    self._env, self._seed, self._policy, on_step=self._present, hold=self._hold
+                )
                 self._scene["phase"] = episode.outcome
                 while True:
                     self._attend()
@@ -248,9 +257,14 @@ def ctrl_c() -> Iterator[threading.Event]:
 
 
 def view(
-    config: JumpConfig, seed: int, console: Console, place: Place = "auto", port: int = 0
+    config: JumpConfig,
+    seed: int,
+    console: Console,
+    place: Place = "auto",
+    port: int = 0,
+    policy: Policy = BASELINE,
 ) -> None:
-    """Show the jump of the pure controller live until the user quits.
+    """Show the jump live until the user quits.
 
     Args:
         config: The jump.
@@ -258,6 +272,7 @@ def view(
         console: Where the address and the keys are written.
         place: Where to show it: in a window, in the browser, or in whichever there can be.
         port: Port of the browser's page; 0 takes a free one.
+        policy: What acts.
 
     Raises:
         ConfigError: If the port is taken.
@@ -274,4 +289,7 @@ def view(
             screen = open_window_screen(env.model, console)
         with contextlib.closing(screen):
             # A page takes seconds to load: there the user starts the jump.
-            Show(env, seed, screen, Playback(paused=browser), enough).run()
+            playback = Playback(paused=browser)
+            Show(
+                env, seed, screen, playback, enough, policy=policy, hold=config.controls_per_step
+            ).run()

@@ -73,6 +73,9 @@ class JumpMetrics:
         angular_momentum_takeoff: Angular momentum about the CoM at take-off, world
             axes (kg m^2/s).
         peak_ground_force: Largest vertical ground force of the episode (N).
+        landing_force: Largest vertical ground force after touch-down (N).
+        joint_work: Mechanical work of the joints, counted positive also where they brake
+            (J).
         sole_slip: Largest horizontal way of a sole's centre on the ground (m), from where it
             stood at the start or at the last touch-down, while the chest is within 30 deg of
             upright. The way of a foot that is lifted alone counts, too.
@@ -96,6 +99,8 @@ class JumpMetrics:
     base_pitch_range: float = UNDEFINED
     angular_momentum_takeoff: tuple[float, float, float] = (UNDEFINED, UNDEFINED, UNDEFINED)
     peak_ground_force: float = 0.0
+    landing_force: float = UNDEFINED
+    joint_work: float = 0.0
     sole_slip: float = 0.0
     chest_lean: tuple[float, float] = (0.0, 0.0)
     landed: bool = False
@@ -183,7 +188,9 @@ class JumpRecorder:
         if state.ground_force > metrics.peak_ground_force:
             metrics.peak_ground_force = state.ground_force
         self._only_feet = self._only_feet and state.only_feet_touch
-        if self._violates(state):
+        speed, torque = np.abs(state.joint_velocity), np.abs(state.joint_torque)
+        metrics.joint_work += float(speed @ torque) * dt
+        if self._violates(state, speed, torque):
             metrics.limit_violations += 1.0
 
         upright = state.chest_tilt < LANDED_TILT
@@ -195,6 +202,8 @@ class JumpRecorder:
             self._touch_down(self._flight, state.time)
         elif upright:
             self._slip(state)
+        if state.time >= self.touchdown_time:
+            metrics.landing_force = max(metrics.landing_force, state.ground_force)
         x, y, z = state.chest_up
         metrics.chest_lean = math.atan2(x, z), math.atan2(y, z)
         metrics.landed = self._only_feet and self.stood and upright
@@ -207,10 +216,10 @@ class JumpRecorder:
             if way > self.metrics.sole_slip:
                 self.metrics.sole_slip = way
 
-    def _violates(self, state: TrueState) -> bool:
+    def _violates(self, state: TrueState, speed: Array, torque: Array) -> bool:
         return bool(
-            (np.abs(state.joint_velocity) > self._speed).any()
-            or (np.abs(state.joint_torque) > self._torque).any()
+            (speed > self._speed).any()
+            or (torque > self._torque).any()
             or (state.joint_position < self._lower).any()
             or (state.joint_position > self._upper).any()
         )
@@ -240,10 +249,12 @@ class JumpRecorder:
         metrics.flight_rotation = flight.rotation
         metrics.base_pitch_range = flight.pitch_high - flight.pitch_low
         metrics.angular_momentum_takeoff = flight.momentum
+        metrics.landing_force = UNDEFINED
 
     def _touch_down(self, flight: _Flight, time: float) -> None:
         if flight.duration >= CHATTER_TIME and flight.apex >= self._best_apex:
             self.metrics.flight_time = time - flight.time
+            self.metrics.landing_force = 0.0
             self.touchdown_time = time
         self._footholds = None
         self._flight = None

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from icub_jump_env.robot import facts
 from icub_jump_env.robot.urdf import load_urdf
@@ -112,6 +113,26 @@ class FeetFixedKinematics:
         frame = model.frames[left]
         self.world_M_ankle = pin.SE3(np.eye(3), sole_position) * frame.placement.inverse()
         return int(frame.parentJoint)
+
+    def configuration(self, posture: Array) -> Array:
+        """Pinocchio's configuration (30,) of a posture (23,) (rad) with the soles on the floor."""
+        self.update(posture)
+        quaternion = Rotation.from_matrix(self.base_rotation).as_quat()
+        return np.concatenate((self.base_position, quaternion, posture))
+
+    def com_shift(self, posture: Array) -> Array:
+        """How the joints shift the CoM with both feet at rest, to first order.
+
+        Args:
+            posture: (23,) joint positions (rad).
+
+        Returns:
+            (23, 3): the shortest displacement of the joints (rad) per shift of the CoM
+            (m) in the world.
+        """
+        self.update(posture)
+        shift: Array = np.linalg.pinv(np.vstack((self.J_feet, self.J_com)))[:, 6:]
+        return shift
 
     def update(self, joint_position: Array) -> None:
         """Recompute all attributes.

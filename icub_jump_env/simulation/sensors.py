@@ -148,7 +148,7 @@ class Sensors:
         self.joint_velocity += error.get("joint_velocity", 0.0)
         self.gyro += error.get("gyro", 0.0)
         if "tilt" in error:
-            self.gravity += np.cross(error["tilt"], self.gravity)
+            self.gravity += _cross(error["tilt"], self.gravity)
             self.gravity /= np.linalg.norm(self.gravity)
         if self._wrong_forces:
             forces = error.get("force", np.zeros(6)).reshape(2, 3)
@@ -172,3 +172,9 @@ class Sensors:
         self._history.append(tuple(reading.copy() for reading in present))
         for reading, past in zip(present, self._history[0], strict=True):
             reading[:] = past
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """The cross product of two vectors; NumPy's takes ten times as long."""
+    (a1, a2, a3), (b1, b2, b3) = a.tolist(), b.tolist()
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])

@@ -50,7 +50,7 @@ def test_prints_the_table_and_writes_json_and_figures(capsys, tmp_path):
     rises = {name: arm["jump"]["flight_height"] for name, arm in content["arms"].items()}
     flight = next(r for r in content["comparison"] if r["quantity"].startswith("flight height"))
     assert flight["ours"] == pytest.approx(100 * rises["with"])
-    assert flight["switched"] == pytest.approx(100 * rises["without"])
+    assert flight["other"] == pytest.approx(100 * rises["without"])
     assert flight["difference"] == pytest.approx(flight["ours"] - 3.5)
     pictures = sorted(figures.glob("*.png"))
     numbers = [p.name[:4] for p in pictures if p.name[:4] != "fig5"]  # which needs OpenGL
@@ -116,11 +116,11 @@ def test_every_field_of_the_configuration_is_a_flag_of_the_same_name(capsys):
 def test_flags_reach_the_configuration():
     options = cli.parse(
         EvalOptions,
-        ["--jump-height", "0.05", "--no-momentum-control", "--residual_scale", "0.01", "0.02",
+        ["--jump-height", "0.05", "0.06", "--no-momentum-control", "--residual_scale", "0.01", "0.02",
          "0.03", "--com-displacement", "0.1", "--solver", "osqp"],
     )  # fmt: skip
     assert options.config == JumpConfig(
-        jump_height=0.05,
+        jump_height=(0.05, 0.06),
         momentum_control=False,
         residual_scale=(0.01, 0.02, 0.03),
         com_displacement=0.1,
@@ -160,6 +160,26 @@ def test_flags_reach_the_configuration():
         (["--randomization", "extreme"], ["extreme", "mild", "JSON"]),
         (["--randomization", '{"friction": [1, 0.4]}'], ["friction", "[1, 0.4]", "lower"]),
         (["--actuators", '{"wings": 2}'], ["actuators", "wings"]),
+        (["--jump-height", "0.04", "0.06", "--view"], ["(0.04, 0.06)", "one height with --view"]),
+        (["--jump-height", "0.04", "0.06", "--report", "r"], ["one height with --report"]),
+        (["--jump-height", "0.04", "0.06", "--study", "realism"], ["one height with --study"]),
+        (["--jump-height", "0.04", "0.06", "--sweep"], ["one height with --sweep"]),
+        (["--jump-height", "0.06", "0.04"], ["jump_height", "lower bound first"]),
+        (["--jump-height", "0.04", "0.5"], ["jump_height", "0.5", "0.01 to 0.15"]),
+        (["--jump-height", "0.04", "0.05", "0.06"], ["--jump-height", "'0.06'"]),
+        (
+            ["--com-scaling", "acceleration", "--jump-height", "0.04", "0.1"],
+            ["jump_height=0.1", "at most"],
+        ),
+        (["--compare"], ["compare", "two or more"]),
+        (["--compare", "baseline"], ["compare", "baseline", "two or more"]),
+        (["--compare", "p.json", "baseline", "p.json"], ["compare", "p.json", "each once"]),
+        (["--compare", "a.json", "b.json", "--policy", "c.json"], ["policy", "--compare"]),
+        (["--compare", "a.json", "b.json", "--results", "r"], ["results", "--compare"]),
+        (["--policy", "p.json", "--sweep"], ["policy", "--sweep"]),
+        (["--policy", "p.json", "--study", "realism"], ["policy", "--study"]),
+        (["--policy", "p.json", "--report", "r"], ["policy", "--report"]),
+        (["--policy", "p.json", "--plot", "figures"], ["plot", "figures", "--policy"]),
     ],
 )
 def test_refuses_with_one_line_that_names_the_reason(capsys, arguments, words):

@@ -17,7 +17,7 @@ import pytest
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation import parallel
-from icub_jump_env.evaluation.parallel import WorkerError, run_jobs
+from icub_jump_env.evaluation.parallel import Job, WorkerError, run_jobs
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -31,7 +31,7 @@ needs_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="
 
 
 def episodes(config, count):
-    return [(config, seed) for seed in range(count)]
+    return [Job(config, seed) for seed in range(count)]
 
 
 def descendants(pid=None):
@@ -116,7 +116,7 @@ def test_a_cluster_in_use_is_used_and_left_running():
         runtime_env={"env_vars": {"PYTHONPATH": str(REPOSITORY)}},
     )
     try:
-        results = run_jobs([(JUMP, 0), (JUMP, -1), (JUMP, 1)], jobs=2)
+        results = run_jobs([Job(JUMP, seed) for seed in (0, -1, 1)], jobs=2)
         with pytest.raises(WorkerError, match=r"seed -1 failed in its worker: ConfigError: seed"):
             list(results)
         with contextlib.closing(run_jobs(episodes(JUMP, 1000), jobs=2)) as results:
@@ -140,10 +140,10 @@ def test_ray_that_does_not_start_is_named(monkeypatch):
 PROGRAM = """
 import sys
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.parallel import run_jobs
+from icub_jump_env.evaluation.parallel import Job, run_jobs
 
 try:
-    work = [(JumpConfig(stand_time=0.0), seed) for seed in range(10_000)]
+    work = [Job(JumpConfig(stand_time=0.0), seed) for seed in range(10_000)]
     for number, _ in enumerate(run_jobs(work, jobs=2)):
         if number == 2:
             print("running", flush=True)

@@ -151,7 +151,7 @@ def test_table_says_what_the_jump_did(read, controller):
     for row, (quantity, *cells) in zip(rows, lines, strict=True):
         assert quantity.startswith(f"{row.quantity}, {row.unit}")
         for value, cell in zip(
-            (row.paper, row.ours, row.difference, row.switched), cells, strict=True
+            (row.paper, row.ours, row.difference, row.other), cells, strict=True
         ):
             if value is None:
                 assert cell == "\N{EN DASH}"

@@ -11,17 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contenders import episode
 from scipy.stats import norm
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation import cli, statistics
+from icub_jump_env.evaluation import cli, series, statistics
+from icub_jump_env.evaluation.contender import BASELINE
 from icub_jump_env.evaluation.failures import Failure
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.output import strict_json
-from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
+from icub_jump_env.evaluation.rollout import make_env, run_episode
 from icub_jump_env.evaluation.statistics import Rate, Statistics, replay_arguments
+from icub_jump_env.evaluation.statistics_figure import statistics_figure
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.simulation.randomization import Randomization
 
@@ -39,12 +42,6 @@ def test_wilson_interval_against_its_definition(count, total):
         if 0.0 < bound < 1.0:
             assert (observed - bound) ** 2 == pytest.approx(z**2 * bound * (1 - bound) / total)
     assert low <= observed <= high
-
-
-def episode(seed, failure=None, **jump):
-    metrics = JumpMetrics().as_dict() | {"landed": failure is None} | jump
-    outcome = "stood" if failure is None else "fell"
-    return Episode(seed, outcome, failure is None, metrics, failure, {"friction": 0.5})
 
 
 class TestStatistics:
@@ -136,6 +133,7 @@ class TestLog:
             {"seed": "1"}, {"is_success": "no"}, {"jump": {}}, {"failure": "tired"},
             {"jump": {**JumpMetrics().as_dict(), "flight_height": "high"}},
             {"jump": {**JumpMetrics().as_dict(), "landed": None}},
+            {"jump_height": None}, {"jump_height": [0.04, 0.06]}, {"reward": None},
         ],
     )  # fmt: skip
     def test_damaged_episodes_are_refused(self, tmp_path, change):
@@ -196,7 +194,7 @@ class TestCommand:
         whole, parts = tmp_path / "whole.jsonl", tmp_path / "parts.jsonl"
         _, expected, _ = evaluate(capsys, "--episodes", "4", "--results", str(whole))
 
-        run_jobs = statistics.run_jobs
+        run_jobs = series.run_jobs
 
         def interrupted(work, jobs):
             for number, result in enumerate(run_jobs(work, jobs)):
@@ -204,7 +202,7 @@ class TestCommand:
                     raise KeyboardInterrupt
                 yield result
 
-        monkeypatch.setattr(statistics, "run_jobs", interrupted)
+        monkeypatch.setattr(series, "run_jobs", interrupted)
         code, out, err = evaluate(capsys, "--episodes", "4", "--results", str(parts))
         assert code == 130
         assert out == ""
@@ -215,10 +213,10 @@ class TestCommand:
         asked = []
 
         def watched(work, jobs):
-            asked.extend(seed for _, seed in work)
+            asked.extend(job.seed for job in work)
             return run_jobs(work, jobs)
 
-        monkeypatch.setattr(statistics, "run_jobs", watched)
+        monkeypatch.setattr(series, "run_jobs", watched)
         code, out, _ = evaluate(capsys, "--episodes", "4", "--results", str(parts), "--resume")
         assert code == 0
         assert asked == [2, 3]
@@ -232,7 +230,7 @@ class TestCommand:
             assert not work
             return iter(())
 
-        monkeypatch.setattr(statistics, "run_jobs", nothing_to_do)
+        monkeypatch.setattr(series, "run_jobs", nothing_to_do)
         _, out, _ = evaluate(capsys, "--episodes", "2", "--resume")
         assert out == expected
 
@@ -251,6 +249,95 @@ class TestCommand:
         header = json.loads(log.read_text().splitlines()[0])
         recorded = EpisodeLog(log, header, resume=True).episodes[options.seed]
         assert replayed == recorded
+
+
+class TestRangeOfCommands:
+    def test_every_episode_jumps_its_own(self, capsys, tmp_path):
+        arguments = [
+            "--jump-height", "0.03", "0.05", "--stand-time", "0.0", "--episodes", "3",
+            "--json", "r.json", "--plot", "figures",
+        ]  # fmt: skip
+        cli.evaluate(arguments)
+        captured = capsys.readouterr()
+        assert "3 to 5 cm jump, velocity controller, baseline" in captured.out
+        assert "alike" not in captured.err
+        assert json.loads(Path("r.json").read_text())["config"]["jump_height"] == [0.03, 0.05]
+        assert Path("figures/statistics.png").stat().st_size > 10_000
+        (log,) = Path("results").iterdir()
+        assert log.name.startswith("velocity-baseline-3to5cm-none-")
+        lines = [json.loads(line) for line in log.read_text().splitlines()[1:]]
+        heights = [line["jump_height"] for line in lines]
+        env = make_env(JumpConfig(jump_height=(0.03, 0.05)))
+        assert heights == [env.reset(seed=seed)[1]["jump_height"] for seed in range(3)]
+        for seed, line in enumerate(lines):
+            alone = make_env(JumpConfig(jump_height=heights[seed], stand_time=0.0))
+            assert line["jump"]["flight_height"] == run_episode(alone, seed).jump["flight_height"]
+
+        cli.evaluate([*arguments, "--resume"])
+        assert capsys.readouterr().out == captured.out
+
+    @pytest.mark.parametrize("heights", [["0.04"], ["0.04", "0.04"]])
+    def test_episodes_that_are_all_alike_are_pointed_out(self, capsys, heights):
+        cli.evaluate(["--jump-height", *heights, "--stand-time", "0.0", "--episodes", "2"])
+        captured = capsys.readouterr()
+        assert "4 cm jump" in captured.out
+        assert "all episodes will be alike" in captured.err
+
+    def test_one_episode_of_it_is_no_nominal_jump(self):
+        assert EvalOptions(JumpConfig(jump_height=(0.03, 0.05))).mode == "statistics"
+        assert EvalOptions(JumpConfig(jump_height=0.03)).mode == "nominal"
+
+    def test_the_log_is_that_of_its_range(self, tmp_path):
+        paths = {
+            series.Series(JumpConfig(jump_height=heights), range(2)).default_log()
+            for heights in (0.03, (0.03, 0.03), (0.03, 0.05), (0.03, 0.050000001))
+        }
+        assert len(paths) == 4
+
+    def test_the_line_that_replays_a_failure_has_its_command(self):
+        config = JumpConfig(jump_height=(0.03, 0.05))
+        episodes = [
+            episode(seed, failure, jump_height=height, flight_height=0.02)
+            for seed, failure, height in ((0, None, 0.03), (1, Failure.TOO_LOW, 0.1 + 0.2 - 0.25))
+        ]
+        *_, lines = statistics.render(episodes, EvalOptions(config, episodes=2), BASELINE)
+        command = lines.splitlines()[-1].partition("eval.py ")[2]
+        options = cli.parse(EvalOptions, shlex.split(command))
+        assert options == EvalOptions(JumpConfig(jump_height=0.1 + 0.2 - 0.25), seed=1, view=True)
+
+
+class TestFigure:
+    """What the picture shows, read from the picture."""
+
+    @staticmethod
+    def axis(heights):
+        episodes = [
+            episode(seed, jump_height=height, flight_height=0.9 * height, flight_rotation=0.1)
+            for seed, height in enumerate(heights)
+        ]
+        lost = episode(9, Failure.TOO_LOW, jump_height=heights[0], flight_height=0.01)
+        (axis,) = statistics_figure([*episodes, lost]).axes
+        lines = {line.get_label(): line for line in axis.lines}
+        assert list(lines) == [f"success: {len(heights)}", "too low: 1", "command",
+                               "least for a success"]  # fmt: skip
+        assert [text.get_text() for text in axis.get_legend().get_texts()] == list(lines)
+        return axis, [line.get_xdata() for line in lines.values()]
+
+    def test_of_one_command_in_centimetres(self):
+        axis, (successes, low, command, least) = self.axis([0.04, 0.04])
+        assert axis.get_xlabel() == "CoM rise (cm)"
+        assert list(successes) == pytest.approx([3.6, 3.6])
+        assert list(low) == pytest.approx([1.0])
+        assert command == [4.0, 4.0]
+        assert least == pytest.approx([2.8, 2.8])
+
+    def test_of_several_commands_in_units_of_each(self):
+        axis, (successes, low, command, least) = self.axis([0.03, 0.05])
+        assert axis.get_xlabel() == "CoM rise / commanded height"
+        assert list(successes) == pytest.approx([0.9, 0.9])
+        assert list(low) == pytest.approx([0.01 / 0.03])
+        assert command == [1.0, 1.0]
+        assert least == [0.7, 0.7]
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
@@ -288,6 +375,7 @@ def test_killed_and_resumed_equals_uninterrupted(tmp_path, jobs):
 def test_replay_arguments_give_the_configuration_back():
     for config in (
         JumpConfig(),
+        JumpConfig(jump_height=(0.03, 0.1 + 0.2 - 0.25)),
         JumpConfig(
             controller="torque", momentum_control=False, residual_scale=(0.01, 0.02, 0.03),
             randomization=Randomization(friction=(0.3, 0.5)), sensors="realistic",

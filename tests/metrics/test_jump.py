@@ -213,6 +213,24 @@ def test_peak_ground_force():
     assert recorder.metrics.peak_ground_force == 1700.0
 
 
+def test_landing_force_is_that_after_the_touch_down_alone():
+    recorder = JumpRecorder(LIMITS, 0.3)
+    now = stand(recorder, 0.0, 0.01, force=2000.0)
+    assert math.isnan(recorder.metrics.landing_force)
+    now = ballistic(recorder, now, speed=0.9)
+    for force in (300.0, 1500.0, 400.0):
+        recorder.update(state(now, force=force))
+        now += DT
+    assert recorder.metrics.landing_force == 1500.0
+
+
+def test_joint_work_counts_driving_and_braking():
+    recorder = JumpRecorder(LIMITS, 0.3)
+    values = {"joint_torque": np.array([10.0, 20.0]), "joint_velocity": np.array([2.0, -0.5])}
+    stand(recorder, 0.0, 0.101, **values)
+    assert recorder.metrics.joint_work == pytest.approx((10.0 * 2.0 + 20.0 * 0.5) * 0.1)
+
+
 @pytest.mark.parametrize(
     ("changes", "success"),
     [

@@ -112,3 +112,21 @@ def test_holding_torque_balances_gravity():
     vertical = wrenches[2] + wrenches[8]
     assert vertical == pytest.approx(kinematics.mass * 9.81, rel=1e-9)
     assert (np.abs(torque) < facts.EFFORT_LIMIT).all()
+
+
+def test_com_shift_moves_the_com_and_neither_foot():
+    kinematics = FeetFixedKinematics()
+    shift = kinematics.com_shift(facts.LANDING)
+    assert kinematics.J_feet @ shift == pytest.approx(np.zeros((6, 3)), abs=1e-12)
+    com, step = kinematics.com.copy(), 1e-6
+    for axis in range(3):
+        kinematics.update(facts.LANDING + step * shift[:, axis])
+        assert (kinematics.com - com) / step == pytest.approx(np.eye(3)[axis], abs=1e-4)
+
+
+def test_com_shift_is_the_shortest():
+    kinematics = FeetFixedKinematics()
+    shift = kinematics.com_shift(facts.LANDING)
+    rows = np.vstack((kinematics.J_feet, kinematics.J_com))
+    # The shortest solution of linear equations has no part in their null space.
+    assert rows.T @ np.linalg.lstsq(rows.T, shift)[0] == pytest.approx(shift, abs=1e-12)

@@ -1,0 +1,210 @@
+"""What train.py can be asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from icub_jump_env.checks import (
+    check_choice,
+    check_count,
+    check_number,
+    check_numbers,
+    store,
+)
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.observation import SLICES, entry_scales
+from icub_jump_env.policy.fields import (
+    ACTION_SCALE_RANGE,
+    AxisName,
+    check_axes,
+    check_hidden,
+)
+
+Inputs = Literal["all", "command"]
+
+COMMAND_BLOCKS = (
+    "phase",
+    "launch_progress",
+    "time",
+    "jump_height",
+    "com_displacement",
+    "takeoff_time",
+)
+"""What is known before the jump: an agent that sees no more replays a plan."""
+
+TASK = JumpConfig(jump_height=(0.04, 0.08), com_displacement=0.09, randomization="hard")
+"""A short launch jumps higher than the paper's 11 cm, and lands less often."""
+
+OPTIONS = "options.json"
+"""File in a run's folder that says what the run was asked for."""
+
+COMMAND = "command"
+"""Its field that holds the words of the command that began the run."""
+
+EVALUATION_SEEDS = range(10_000, 10_064)
+"""Episodes that choose the best policy; neither trained on nor reported."""
+
+
+@dataclass(frozen=True)
+class PPOOptions:
+    """How PPO learns.
+
+    Attributes:
+        episodes: Episodes between two updates, of all environments together.
+        batch_size: Steps in one gradient step.
+        epochs: Passes over the episodes in an update.
+        learning_rate: Step size of Adam.
+        gamma: Discount per step.
+        gae_lambda: Trade of bias for variance in the advantages.
+        clip_range: How far an update may change the probability of an action.
+        target_kl: An update ends early beyond 1.5 times this divergence.
+        hidden: Widths of the hidden layers, of policy and value function alike.
+        log_std: Logarithm of the exploration noise, at the beginning and at the end.
+        warmup: Updates at the beginning that teach the value function alone.
+        action_scale: Largest action of the policy.
+        ramp: Updates during which the actions grow to their scale.
+    """
+
+    episodes: int = 64
+    batch_size: int = 256
+    epochs: int = 10
+    learning_rate: float = 5e-4
+    gamma: float = 0.999
+    gae_lambda: float = 0.98
+    clip_range: float = 0.2
+    target_kl: float = 0.04
+    hidden: tuple[int, ...] = (64, 64)
+    log_std: tuple[float, float] = (-1.0, -2.3)
+    warmup: int = 1
+    action_scale: float = 1.0
+    ramp: int = 0
+
+    def __post_init__(self) -> None:
+        for name, least in (
+            ("episodes", 2),
+            ("batch_size", 2),
+            ("epochs", 1),
+            ("warmup", 0),
+            ("ramp", 0),
+        ):
+            check_count(name, getattr(self, name), least, 100_000)
+        for name, low, high in (
+            ("learning_rate", 1e-8, 1.0),
+            ("gamma", 0.0, 1.0),
+            ("gae_lambda", 0.0, 1.0),
+            ("clip_range", 1e-3, 1.0),
+            ("target_kl", 1e-6, 10.0),
+            ("action_scale", *ACTION_SCALE_RANGE),
+        ):
+            store(self, **{name: check_number(name, getattr(self, name), low, high)})
+        store(self, hidden=check_hidden(self.hidden))
+        store(self, log_std=check_numbers("log_std", self.log_std, 2, -10.0, 2.0))
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """Train a residual on the CoM reference with PPO.
+
+    Attributes:
+        env: The jump; every field of the environment's configuration is a flag.
+        ppo: How PPO learns.
+        inputs: What the policy sees: the whole observation, or command and time alone.
+        axes: Axes of the action that it uses.
+        timesteps: Steps of the launch to learn from; an episode has about 35.
+        seed: Seed of everything random.
+        jobs: Environments side by side, each in a process; the result depends on it.
+        checkpoint_every: Updates between two checkpoints; with each the policy is
+            evaluated.
+        run: Folder of the run; by default one in runs/, named by controller and seed.
+        resume: Finish the interrupted run in this folder.
+        config: Take what is not said here from this file, such as a run's options.json.
+
+    Raises:
+        ConfigError: If a value is out of range or options exclude each other.
+    """
+
+    env: Annotated[JumpConfig, tyro.conf.arg(name="")] = TASK
+    ppo: PPOOptions = field(default_factory=PPOOptions)
+    inputs: Inputs = "all"
+    axes: tuple[AxisName, ...] = ("forward", "vertical")
+    timesteps: int = 100_000
+    seed: int = 0
+    jobs: int = 8
+    checkpoint_every: int = 4
+    run: Path | None = None
+    resume: Path | None = None
+    config: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_choice("inputs", self.inputs, ("all", "command"))
+        store(self, axes=check_axes(self.axes))
+        check_count("timesteps", self.timesteps, 1, 1_000_000_000)
+        check_count("seed", self.seed, 0, 2**32 - 1)
+        check_count("jobs", self.jobs, 1, 1000)
+        check_count("checkpoint_every", self.checkpoint_every, 1)
+        if self.env.render_mode is not None:
+            raise ConfigError("render_mode", self.env.render_mode, "not in a training")
+        if self.ppo.episodes % self.jobs:
+            raise ConfigError("ppo.episodes", self.ppo.episodes, f"a multiple of jobs={self.jobs}")
+        if self.resume is not None and self.run not in (None, self.resume):
+            raise ConfigError("run", str(self.run), "not with --resume, which names it")
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the run."""
+        default = Path("runs") / f"{self.env.controller}-seed{self.seed}"
+        return self.resume or self.run or default
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Entries of the observation that the policy sees."""
+        names = tuple(entry_scales())
+        if self.inputs == "all":
+            return names
+        return tuple(name for block in COMMAND_BLOCKS for name in names[SLICES[block]])
+
+    def as_dict(self) -> dict[str, Any]:
+        """What the result depends on, for JSON."""
+        values = dataclasses.asdict(self)
+        for name in ("run", "resume", "config"):
+            del values[name]
+        return values
+
+
+def read_options(path: Path) -> TrainOptions:
+    """Options from a file; what it does not say is as by default.
+
+    Raises:
+        ConfigError: If it is not a file of options, or a value is out of range.
+    """
+    try:
+        values = json.loads(path.read_text())
+    except (OSError, ValueError, RecursionError) as error:
+        raise ConfigError("config", str(path), f"a JSON file ({error})") from None
+    if not isinstance(values, dict):
+        raise ConfigError("config", str(path), "a JSON object")
+    top = _known("config", values, [*TrainOptions().as_dict(), COMMAND])
+    env = _known("env", top.pop("env", {}), dataclasses.asdict(TASK))
+    ppo = _known("ppo", top.pop("ppo", {}), dataclasses.asdict(PPOOptions()))
+    top.pop(COMMAND, None)
+    jump = JumpConfig.from_kwargs({**dataclasses.asdict(TASK), **env})
+    return TrainOptions(env=jump, ppo=PPOOptions(**ppo), **top)
+
+
+def _known(name: str, values: Any, fields: Collection[str]) -> dict[str, Any]:
+    """A copy of a mapping, all of whose keys are fields."""
+    if not isinstance(values, dict):
+        raise ConfigError(name, values, "a JSON object")
+    for key in values:
+        if key not in fields:
+            allowed = f"no such field; the fields of {name} are {', '.join(fields)}"
+            raise ConfigError(key, values[key], allowed)
+    return dict(values)

@@ -1,0 +1,316 @@
+"""One training run: learn, evaluate, save, and go on where it stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch.utils.tensorboard  # noqa: F401 (missing, it is to be missed now)
+from rich.console import Console
+from rich.progress import Progress, TaskID
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+
+from agents.checkpoints import (
+    Checkpoint,
+    begin_segment,
+    load_latest,
+    restore,
+    save_checkpoint,
+    segment_seeds,
+)
+from agents.environment import LaunchEnv, acting_steps
+from agents.options import COMMAND, EVALUATION_SEEDS, OPTIONS, TrainOptions, read_options
+from agents.ppo import export, freeze_policy, make_model, set_noise
+from agents.run_folder import lock_run
+from agents.workers import JumpVecEnv
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.compare import Summary, by_command
+from icub_jump_env.evaluation.output import progress_display, say, write_json
+from icub_jump_env.evaluation.provenance import command, versions
+from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.table import CM, DEG
+from icub_jump_env.policy import save_policy
+from icub_jump_env.policy.fields import check_command
+
+CURVE = "curve.json"
+"""Its evaluations and all its seeds."""
+BEST = "best.safetensors"
+"""The policy with the largest mean reward in an evaluation."""
+LAST = "last.safetensors"
+"""That of the latest evaluation."""
+
+MOST_CHECKPOINTS = 500
+"""Of a run; the learning curve is in each of them, whose size is limited."""
+
+_PACKAGES = ("stable-baselines3", "torch")
+
+
+def train(options: TrainOptions, console: Console) -> None:
+    """Train, from the beginning or from the latest checkpoint.
+
+    Args:
+        options: What to train.
+        console: Where to report.
+
+    Raises:
+        ConfigError: If the folder holds another run, or the run had too many checkpoints.
+        RunLockedError: If another process writes to it.
+        CheckpointError: If it is to be resumed and all its checkpoints are damaged.
+        WorkerError: If a worker dies, hangs or meets an error.
+        OSError: If the file system refuses.
+    """
+    _check_checkpoints(options)
+    folder = options.folder
+    with _named(folder), lock_run(folder):
+        words = _claim(options)
+        checkpoint = load_latest(folder, partial(say, console))
+        if checkpoint is not None and checkpoint.num_timesteps >= options.timesteps:
+            say(console, f"{folder} is finished")
+            return
+        make = partial(LaunchEnv, options.env, options.input_names, options.axes)
+        numbers = range(options.jobs)
+        with contextlib.closing(JumpVecEnv([partial(make, number) for number in numbers])) as env:
+            _learn(options, words, env, checkpoint, console)
+        say(console, f"wrote {folder / BEST}")
+
+
+def _check_checkpoints(options: TrainOptions) -> None:
+    updates = options.timesteps / (options.ppo.episodes * acting_steps(options.env))
+    least = math.ceil(updates / MOST_CHECKPOINTS)
+    if options.checkpoint_every < least:
+        allowed = f"at least {least}: a run has at most {MOST_CHECKPOINTS} checkpoints"
+        raise ConfigError("checkpoint_every", options.checkpoint_every, allowed)
+
+
+@contextlib.contextmanager
+def _named(folder: Path) -> Iterator[None]:
+    """A full disk says where."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None or error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror, str(folder)) from error
+
+
+def _claim(options: TrainOptions) -> Sequence[str]:
+    """See that the folder holds this run or nothing.
+
+    Returns:
+        The words of the command that began the run.
+    """
+    folder, file = options.folder, options.folder / OPTIONS
+    if options.resume is None:
+        if file.exists() or any(folder.glob("checkpoint-*")):
+            raise ConfigError("run", str(folder), f"a folder without a run, or --resume {folder}")
+        words = command()
+        write_json(file, {COMMAND: words, **options.as_dict()})
+        return words
+    recorded = _flags(read_options(file))
+    for flag, value in _flags(options).items():
+        if value != recorded[flag]:
+            raise ConfigError(flag, value, f"{recorded[flag]!r}, as {file} has it")
+    return check_command(json.loads(file.read_text()).get(COMMAND, command()))
+
+
+def _flags(options: TrainOptions) -> dict[str, Any]:
+    """What the result depends on, by the names on the command line."""
+    values = options.as_dict()
+    env, ppo = values.pop("env"), values.pop("ppo")
+    return {**values, **env, **{f"ppo.{name}": value for name, value in ppo.items()}}
+
+
+def _learn(
+    options: TrainOptions,
+    words: Sequence[str],
+    env: JumpVecEnv,
+    checkpoint: Checkpoint | None,
+    console: Console,
+) -> None:
+    model = make_model(options, env)
+    folder = str(options.folder)
+    logger = Logger(folder, [TensorBoardOutputFormat(str(options.folder / "tensorboard"))])
+    with contextlib.closing(logger), progress_display(console) as display:
+        model.set_logger(logger)
+        task = display.add_task("learning", total=options.timesteps)
+        run = _Run(options, words, console, display, task)
+        if checkpoint is not None:
+            restore(model, checkpoint)
+            run.resume(checkpoint.number, checkpoint.progress)
+            say(console, f"going on from step {model.num_timesteps} of {options.timesteps}")
+        remaining = options.timesteps - model.num_timesteps
+        model.learn(remaining, callback=run, reset_num_timesteps=checkpoint is None)
+
+
+class _Run(BaseCallback):
+    """Does around Stable-Baselines3's learning what a run consists of besides.
+
+    Checkpoints come where a rollout begins: the policy is evaluated, all is saved, and
+    every generator and environment starts anew from a recorded seed. A run that goes on
+    from a checkpoint does the same.
+    """
+
+    model: PPO
+
+    def __init__(
+        self,
+        options: TrainOptions,
+        words: Sequence[str],
+        console: Console,
+        display: Progress,
+        task: TaskID,
+    ) -> None:
+        super().__init__()
+        self._options = options
+        self._command = words
+        self._console = console
+        self._display = display
+        self._task = task
+        self._updates = 0
+        self._number = 0
+        self._curve: list[dict[str, Any]] = []
+        self._seeds: list[list[int]] = []
+        self._episodes: list[dict[str, Any]] = []
+        self._resumed = False
+
+    def resume(self, number: int, progress: Mapping[str, Any]) -> None:
+        """Take up what a checkpoint noted."""
+        self._number, self._resumed = number, True
+        self._updates, self._curve = progress["updates"], progress["curve"]
+        seed, jobs = self._options.seed, self._options.jobs
+        self._seeds = [segment_seeds(seed, earlier, jobs) for earlier in range(1, number)]
+
+    @property
+    def _env(self) -> JumpVecEnv:
+        env = self.model.get_env()
+        assert isinstance(env, JumpVecEnv)
+        return env
+
+    @property
+    def _action_scale(self) -> float:
+        ppo = self._options.ppo
+        share = (self._updates + 1) / (ppo.ramp + 1)
+        return max(1e-3, ppo.action_scale * min(1.0, share))
+
+    def _on_rollout_start(self) -> None:
+        if self._resumed:
+            self._resumed = False
+            self._begin_segment()
+        elif self._updates % self._options.checkpoint_every == 0:
+            self._checkpoint()
+            self._begin_segment()
+        set_noise(self.model, self._options)
+        freeze_policy(self.model, self._updates < self._options.ppo.warmup)
+        self._env.env_method("scale_actions", self._action_scale)
+
+    def _on_step(self) -> bool:
+        for done, info in zip(self.locals["dones"], self.locals["infos"], strict=True):
+            if done:
+                self._episodes.append(info)
+        self._display.update(self._task, completed=self.model.num_timesteps)
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self._log_episodes()
+        actions = self.model.rollout_buffer.actions
+        size = self._action_scale * np.abs(np.clip(actions, -1.0, 1.0)).mean()
+        self.logger.record("rollout/residual_size", float(size))
+        self.logger.dump(self.model.num_timesteps)
+        self._updates += 1
+
+    def _on_training_end(self) -> None:
+        self._checkpoint()
+
+    def _log_episodes(self) -> None:
+        record = self.logger.record
+        infos, self._episodes = self._episodes, []
+        success: dict[int, list[bool]] = {}
+        for info in infos:
+            success.setdefault(int(CM * info["jump_height"]), []).append(info["is_success"])
+        for low, successes in sorted(success.items()):
+            record(f"rollout/success_{low}_to_{low + 1}_cm", np.mean(successes))
+        jumps = [info["jump"] for info in infos]
+        record("rollout/success", np.mean([info["is_success"] for info in infos]))
+        record("rollout/landed", np.mean([jump["landed"] for jump in jumps]))
+        record("rollout/rise_cm", CM * np.mean([jump["flight_height"] for jump in jumps]))
+        rotations = [abs(jump["flight_rotation"]) for jump in jumps if jump["flight_time"]]
+        if rotations:
+            record("rollout/rotation_deg", DEG * np.mean(rotations))
+
+    def _checkpoint(self) -> None:
+        """Evaluate and save."""
+        self._number += 1
+        self._evaluate()
+        progress = {"updates": self._updates, "curve": self._curve}
+        save_checkpoint(self._options.folder, self.model, self._number, progress)
+
+    def _begin_segment(self) -> None:
+        self._seeds.append(begin_segment(self.model, self._options.seed, self._number))
+
+    def _evaluate(self) -> None:
+        policy = export(self.model, self._options, self._action_scale)
+        episodes: list[Episode] = []
+        # One episode each at a time: a worker that does not answer for long counts as hung.
+        for start in range(0, len(EVALUATION_SEEDS), self._options.jobs):
+            seeds = EVALUATION_SEEDS[start : start + self._options.jobs]
+            episodes += itertools.chain(*self._env.env_method("evaluate", policy, seeds))
+        self._curve.append(_point(self.model.num_timesteps, episodes))
+        newest = self._curve[-1]
+        for name in ("score", "success", "landed", "rise", "rotation"):
+            self.logger.record(f"evaluation/{name}", newest[name])
+        self.logger.dump(self.model.num_timesteps)
+        self._save_policy(LAST)
+        if newest["score"] >= max(point["score"] for point in self._curve):
+            self._save_policy(BEST)
+        write_json(
+            self._options.folder / CURVE,
+            {
+                "evaluations": self._curve,
+                "seed": self._options.seed,
+                "episode_seeds": self._seeds,
+                "evaluation_seeds": [EVALUATION_SEEDS.start, EVALUATION_SEEDS.stop],
+            },
+        )
+        say(
+            self._console,
+            f"{newest['timesteps']} steps: success {100 * newest['success']:.1f} %, "
+            f"rise {CM * newest['rise']:.2f} cm",
+        )
+
+    def _save_policy(self, name: str) -> None:
+        save_policy(
+            self._options.folder / name,
+            export(self.model, self._options, self._action_scale),
+            config=self._options.env,
+            versions=versions(*_PACKAGES),
+            command=self._command,
+            seed=self._options.seed,
+            results={"evaluation": self._curve[-1]},
+        )
+
+
+def _point(timesteps: int, episodes: Sequence[Episode]) -> dict[str, Any]:
+    """A point of the learning curve."""
+    summary = Summary.of(episodes)
+    return {
+        "timesteps": timesteps,
+        "episodes": len(episodes),
+        "score": float(np.mean([episode.reward for episode in episodes])),
+        "success": summary.success.share,
+        "landed": summary.landed.share,
+        "rise": summary.rise,
+        "rotation": None if math.isnan(summary.rotation) else summary.rotation,
+        "success_by_command": {
+            f"{low} to {high} cm": Summary.of(group).success.share
+            for (low, high), group in by_command(episodes).items()
+        },
+    }

@@ -1,0 +1,168 @@
+"""The card of a policy: what it is, and the environment that it was made for."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self, get_args
+
+from icub_jump_env.checks import check_choice, check_count, check_number, check_seed, store
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError, PolicyMismatchError
+from icub_jump_env.observation import entry_scales
+from icub_jump_env.policy.fields import (
+    ACTION_SCALE_RANGE,
+    AxisName,
+    PolicyKind,
+    check_axes,
+    check_command,
+    check_hidden,
+    check_inputs,
+    check_mapping,
+    check_observation,
+    check_results,
+    check_versions,
+)
+
+FORMAT = 1
+"""Format of the files that this version reads and writes."""
+
+TASK_FIELDS = (
+    "controller",
+    "com_displacement",
+    "com_scaling",
+    "momentum_control",
+    "residual_scale",
+    "residual_phases",
+    "control_frequency",
+    "agent_frequency",
+    "ankle_shift",
+)
+"""The fields of the configuration that say what an action does and when.
+
+The others may differ from those of the training: a policy is meant for other commands,
+and to be tried on other actuators, sensors and worlds; solver and physics step decide how
+exactly the same is computed; rendering and ``stand_time`` do not reach it.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyCard:
+    """What is known about a policy beside its numbers; a JSON file.
+
+    Attributes:
+        format: Format of the files.
+        kind: Kind of the policy.
+        inputs: Names of the entries of the observation that it sees.
+        hidden: Widths of the hidden layers.
+        axes: The axes of the action that it acts on.
+        action_scale: Its largest action.
+        observation: Name and scale of each entry of the observation it was trained with.
+        config: The environment it was trained in; on disk, and also here, a mapping will
+            do.
+        versions: Version of each package.
+        command: The words of the command that trained it.
+        seed: Seed of the training.
+        results: Numbers such as success rates, by name; lists, mappings and None may be
+            among them.
+        sha256: Hash of the file with the numbers, in hexadecimal; None until saved.
+
+    Raises:
+        ConfigError: If a field is of the wrong type or out of range.
+    """
+
+    format: int = FORMAT
+    kind: PolicyKind
+    inputs: tuple[str, ...]
+    hidden: tuple[int, ...]
+    axes: tuple[AxisName, ...]
+    action_scale: float
+    observation: tuple[tuple[str, float], ...]
+    config: JumpConfig
+    versions: Mapping[str, str]
+    command: tuple[str, ...]
+    seed: int | None
+    results: Mapping[str, Any]
+    sha256: str | None = None
+
+    def __post_init__(self) -> None:
+        check_count("format", self.format, FORMAT, FORMAT)
+        check_choice("kind", self.kind, get_args(PolicyKind))
+        observation = check_observation(self.observation)
+        store(
+            self,
+            observation=observation,
+            inputs=check_inputs(self.inputs, dict(observation)),
+            hidden=check_hidden(self.hidden),
+            axes=check_axes(self.axes),
+            action_scale=check_number("action_scale", self.action_scale, *ACTION_SCALE_RANGE),
+            config=_check_config(self.config),
+            versions=check_versions(self.versions),
+            command=check_command(self.command),
+            seed=check_seed(self.seed),
+            results=check_results("results", check_mapping("results", self.results)),
+        )
+        digest = self.sha256
+        if digest is not None and not (
+            isinstance(digest, str) and re.fullmatch("[0-9a-f]{64}", digest)
+        ):
+            raise ConfigError("sha256", digest, "64 hexadecimal digits")
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
+        """The card from the content of its file.
+
+        Raises:
+            ConfigError: If a field is missing, unknown, of the wrong type or out of range.
+        """
+        check_count("format", values.get("format"), FORMAT, FORMAT)
+        names = {field.name for field in dataclasses.fields(cls)}
+        for name in sorted(names ^ values.keys()):
+            state = "a field that is missing" if name in names else "no such field"
+            allowed = f"{state}; the fields are {', '.join(sorted(names))}"
+            raise ConfigError(name, values.get(name), allowed)
+        return cls(**values)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Mappings, lists and numbers, as JSON has them."""
+        return dataclasses.asdict(self)
+
+
+def mismatches(card: PolicyCard, config: JumpConfig) -> list[tuple[str, Any, Any]]:
+    """In what the policy depends on, how an environment differs from the policy's.
+
+    A policy finds the entries of the observation by name, so that their order is free.
+
+    Returns:
+        Name of each field that differs, the card's value, the environment's; None for an
+        entry of the observation that one of them lacks.
+    """
+    theirs, ours = dict(card.observation), entry_scales()
+    pairs = [(f"observation.{name}", theirs.get(name), ours.get(name)) for name in theirs | ours]
+    trained, present = _explicit(card.config), _explicit(config)
+    pairs += [(name, getattr(trained, name), getattr(present, name)) for name in TASK_FIELDS]
+    return [pair for pair in pairs if pair[1] != pair[2]]
+
+
+def check_match(card: PolicyCard, config: JumpConfig) -> None:
+    """Refuse an environment that the policy was not made for.
+
+    Raises:
+        PolicyMismatchError: If it differs in anything the policy depends on; names it all.
+    """
+    differences = mismatches(card, config)
+    if differences:
+        raise PolicyMismatchError(differences)
+
+
+def _explicit(config: JumpConfig) -> JumpConfig:
+    """The same with the controller's default rate written out."""
+    return dataclasses.replace(config, control_frequency=config.control_rate)
+
+
+def _check_config(config: Any) -> JumpConfig:
+    if isinstance(config, JumpConfig):
+        return config
+    return JumpConfig.from_kwargs(check_mapping("config", config))

@@ -1,0 +1,139 @@
+"""Policies on disk."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.checks import check_type
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError, PolicyFileError
+from icub_jump_env.observation import entry_scales
+from icub_jump_env.policy.card import PolicyCard, check_match
+from icub_jump_env.policy.files import load_tensors, save_tensors
+from icub_jump_env.policy.network import NetworkPolicy
+from icub_jump_env.policy.replay import ReplayPolicy
+
+Array = NDArray[np.float32]
+SavedPolicy = NetworkPolicy | ReplayPolicy
+
+MAX_POLICY_SIZE = 16 * 2**20
+"""Largest file of a policy (bytes)."""
+
+_SHARED_FIELDS = ("inputs", "hidden", "axes", "action_scale")
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedPolicy:
+    """A policy with its card.
+
+    Attributes:
+        policy: The policy itself.
+        card: What is known about it.
+    """
+
+    policy: SavedPolicy
+    card: PolicyCard
+
+    def __call__(self, observation: Array) -> Array:
+        """The action (3,) for an observation (80,)."""
+        return self.policy(observation)
+
+
+def save_policy(
+    path: str | os.PathLike[str],
+    policy: SavedPolicy,
+    *,
+    config: JumpConfig,
+    versions: Mapping[str, str],
+    command: Sequence[str],
+    seed: int | None,
+    results: Mapping[str, Any],
+) -> None:
+    """Write a policy and its card.
+
+    Args:
+        path: The ``.safetensors`` file or its ``.json`` card.
+        policy: The policy.
+        config: The environment it was trained in.
+        versions: Version of each package.
+        command: The words of the command that trained it.
+        seed: Seed of the training.
+        results: Numbers such as success rates, by name.
+
+    Raises:
+        ConfigError: If a field of the card is out of range.
+        PolicyFileError: If the path is not fit for such files.
+        OSError: If the file system refuses.
+    """
+    check_type("policy", policy, NetworkPolicy, ReplayPolicy)
+    if isinstance(policy, ReplayPolicy) and policy.agent_frequency != config.agent_frequency:
+        raise ConfigError(
+            "agent_frequency",
+            policy.agent_frequency,
+            f"the environment's {config.agent_frequency}",
+        )
+    card = PolicyCard(
+        kind=policy.kind,
+        observation=tuple(entry_scales().items()),
+        config=config,
+        versions=versions,
+        command=tuple(command),
+        seed=seed,
+        results=results,
+        **{field: getattr(policy, field) for field in _SHARED_FIELDS},
+    )
+    save_tensors(Path(path), policy.tensors(), card.as_dict())
+
+
+def load_policy(path: str | os.PathLike[str], config: JumpConfig | None = None) -> LoadedPolicy:
+    """Read a policy.
+
+    Args:
+        path: The ``.safetensors`` file or its ``.json`` card.
+        config: The environment it is for, if to be checked.
+
+    Raises:
+        PolicyFileError: If a file is missing, damaged, or not a policy.
+        PolicyMismatchError: If the policy was made for another environment.
+        OSError: If the file system refuses.
+    """
+    tensors, values = load_tensors(Path(path), MAX_POLICY_SIZE)
+    try:
+        card = PolicyCard.from_mapping(values)
+        if config is not None:
+            check_match(card, config)
+        return LoadedPolicy(_make(card, tensors), card)
+    except ConfigError as error:
+        raise PolicyFileError(str(path), str(error)) from error
+
+
+def _make(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> SavedPolicy:
+    """The policy of a card, which must say the same about it as its arrays."""
+    policy: SavedPolicy
+    if card.kind == "replay":
+        _check_names(tensors, ["commands", "actions"])
+        frequency = card.config.agent_frequency
+        policy = ReplayPolicy(tensors["commands"], tensors["actions"], frequency)
+    else:
+        names = [(f"layers.{i}.weight", f"layers.{i}.bias") for i in range(len(card.hidden) + 1)]
+        _check_names(tensors, [name for layer in names for name in layer])
+        layers = tuple((tensors[weight], tensors[bias]) for weight, bias in names)
+        policy = NetworkPolicy(card.inputs, layers, card.axes, card.action_scale)
+    for field in _SHARED_FIELDS:
+        given, actual = getattr(card, field), getattr(policy, field)
+        if given != actual:
+            raise ConfigError(field, given, f"{actual!r}, as the arrays have it")
+    return policy
+
+
+def _check_names(tensors: Mapping[str, Any], expected: list[str]) -> None:
+    for name in sorted(tensors.keys() ^ set(expected)):
+        state = "an array that is missing" if name in expected else "no array of this policy"
+        raise ConfigError("tensors", name, f"{state}; they are {', '.join(expected)}")

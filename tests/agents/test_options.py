@@ -1,0 +1,126 @@
+"""What train.py can be asked for, on the command line and in files."""
+
+import dataclasses
+import json
+
+import pytest
+from tiny_run import UNUSUAL
+
+from agents.options import TASK, PPOOptions, TrainOptions, read_options
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.output import write_json
+from icub_jump_env.observation import entry_scales
+
+
+@pytest.mark.parametrize("options", [TrainOptions(), UNUSUAL], ids=["default", "unusual"])
+def test_options_survive_a_file(tmp_path, options):
+    file = tmp_path / "options.json"
+    write_json(file, options.as_dict())
+    assert read_options(file) == options
+
+
+def test_a_file_says_what_it_wants_and_the_task_the_rest(tmp_path):
+    file = tmp_path / "options.json"
+    file.write_text('{"env": {"controller": "torque"}, "ppo": {"epochs": 3}, "seed": 4}')
+    assert read_options(file) == TrainOptions(
+        env=dataclasses.replace(TASK, controller="torque"), ppo=PPOOptions(epochs=3), seed=4
+    )
+
+
+CONTENTS = {
+    "nothing": ("", "config='options.json' is not allowed: a JSON file"),
+    "not text": (b"\xff\x00\xfe", "config='options.json' is not allowed: a JSON file"),
+    "nested": ("[" * 200_000, "config='options.json' is not allowed: a JSON file"),
+    "a list": ("[1, 2]", "config='options.json' is not allowed: a JSON object"),
+    "unknown": ('{"wings": 2}', "wings=2 is not allowed: no such field; the fields of config are"),
+    "unknown below": ('{"ppo": {"wings": 2}}', "wings=2 is not allowed: no such field; the field"),
+    "unknown jump": ('{"env": {"wings": 2}}', "wings=2 is not allowed: no such field; the fields"),
+    "a folder": ('{"resume": "x"}', "resume='x' is not allowed: no such field"),
+    "no mapping": ('{"env": 3}', "env=3 is not allowed: a JSON object"),
+    "null": ('{"timesteps": null}', "timesteps=None is not allowed: a whole number from 1"),
+    "a fraction": ('{"seed": 0.5}', "seed=0.5 is not allowed: a whole number from 0"),
+    "not a number": ('{"ppo": {"gamma": NaN}}', "gamma=nan is not allowed: a number from 0 to 1"),
+    "ragged": (
+        '{"env": {"jump_height": [[1], [2, 3]]}}',
+        "jump_height=[[1], [2, 3]] is not allow",
+    ),
+    "a mapping": ('{"axes": {"forward": 1}}', "axes={'forward': 1} is not allowed"),
+    "a model": ('{"env": {"actuators": {"motor": 3}}}', "motor=3 is not allowed"),
+}
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+def test_another_file_is_refused(tmp_path, content):
+    text, message = CONTENTS[content]
+    file = tmp_path / "options.json"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(ConfigError) as refusal:
+        read_options(file)
+    assert message in str(refusal.value).replace(f"{tmp_path}/", "")
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"config='.*none' is not allowed: .*No such file"):
+        read_options(tmp_path / "none")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"inputs": "some"}, "inputs='some' is not allowed: one of 'all', 'command'"),
+        ({"axes": ()}, "axes=() is not allowed: some of forward, lateral, vertical"),
+        ({"axes": ("vertical", "forward")}, "in this order"),
+        ({"timesteps": 0}, "timesteps=0 is not allowed: a whole number from 1 to 1000000000"),
+        ({"seed": 2**32}, "seed=4294967296 is not allowed: a whole number from 0 to 4294967295"),
+        ({"jobs": 0}, "jobs=0 is not allowed: a whole number from 1 to 1000"),
+        ({"checkpoint_every": 0}, "checkpoint_every=0 is not allowed: a whole number from 1"),
+        ({"jobs": 7}, "ppo.episodes=64 is not allowed: a multiple of jobs=7"),
+        ({"env": JumpConfig(render_mode="rgb_array")}, "render_mode='rgb_array' is not allowed"),
+    ],
+)
+def test_a_value_out_of_range_is_refused(changes, message):
+    with pytest.raises(ConfigError) as refusal:
+        TrainOptions(**changes)
+    assert message in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("episodes", 1),
+        ("batch_size", 1),
+        ("epochs", 0),
+        ("learning_rate", 0.0),
+        ("gamma", 1.1),
+        ("gae_lambda", -0.1),
+        ("clip_range", 0.0),
+        ("target_kl", float("inf")),
+        ("hidden", (8, 0)),
+        ("hidden", (513,)),
+        ("log_std", (-1.0,)),
+        ("log_std", (-1.0, 3.0)),
+        ("warmup", -1),
+        ("ramp", 1.5),
+        ("action_scale", 0.0),
+        ("action_scale", 1.1),
+    ],
+)
+def test_a_setting_of_ppo_out_of_range_is_refused(name, value):
+    with pytest.raises(ConfigError, match=f"^{name}=.* is not allowed: .*"):
+        PPOOptions(**{name: value})
+
+
+def test_a_plan_sees_the_command_and_the_time_alone():
+    entries = tuple(entry_scales())
+    assert TrainOptions().input_names == entries
+    assert TrainOptions(inputs="command").input_names == (
+        *("phase.launch", "phase.flight", "phase.landing", "launch_progress", "time"),
+        *("jump_height", "com_displacement", "takeoff_time"),
+    )
+
+
+def test_the_default_folder_is_named_by_controller_and_seed():
+    torque = TrainOptions(env=JumpConfig(controller="torque"), seed=3)
+    assert str(torque.folder) == "runs/torque-seed3"
+    assert json.dumps(torque.as_dict())  # paths are not in it

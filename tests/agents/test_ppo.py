@@ -1,0 +1,124 @@
+"""PPO starts at the baseline, and what is exported acts as what was trained."""
+
+import dataclasses
+from functools import partial
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.vec_env import DummyVecEnv
+from tiny_run import PPO
+
+from agents.environment import LaunchEnv, acting_steps
+from agents.options import TASK, TrainOptions
+from agents.ppo import export, freeze_policy, make_model, set_noise
+from icub_jump_env.evaluation.rollout import make_env
+from icub_jump_env.observation import entry_scales
+from icub_jump_env.policy.fields import AXES
+
+OPTIONS = TrainOptions(
+    env=dataclasses.replace(TASK, stand_time=0.1), ppo=PPO, jobs=1, timesteps=1000
+)
+ROLLOUT = 2 * acting_steps(OPTIONS.env)
+
+
+def make(**changes):
+    options = dataclasses.replace(OPTIONS, **changes)
+    env = DummyVecEnv([partial(LaunchEnv, options.env, options.input_names, options.axes)])
+    return options, make_model(options, env)
+
+
+def weights(model):
+    """Bytes of the weights, of the policy and of the value function; and of the noise."""
+    parts = {
+        "policy": (model.policy.mlp_extractor.policy_net, model.policy.action_net),
+        "value": (model.policy.mlp_extractor.value_net, model.policy.value_net),
+    }
+    found = {
+        name: b"".join(p.detach().numpy().tobytes() for part in pair for p in part.parameters())
+        for name, pair in parts.items()
+    }
+    return found | {"noise": model.policy.log_std.detach().numpy().tobytes()}
+
+
+def changed(model, before):
+    after = weights(model)
+    return {name for name in after if after[name] != before[name]}
+
+
+@pytest.mark.parametrize("hidden", [(8,), (), (5, 3)])
+def test_the_mean_action_is_zero_at_the_start(rng, hidden):
+    options, model = make(ppo=dataclasses.replace(PPO, hidden=hidden))
+    observations = rng.uniform(-10, 10, (50, 80)).astype(np.float32)
+    actions, _ = model.predict(observations, deterministic=True)
+    assert not actions.any()
+    policy = export(model, options, 1.0)
+    assert policy.hidden == hidden
+    assert not any(policy(observation).any() for observation in observations)
+    values = model.policy.predict_values(torch.tensor(observations))
+    assert values.unique().numel() > 1  # the value function is not zeroed
+
+
+def test_learning_spares_the_frozen_policy_and_always_the_noise():
+    _, model = make()
+    torch.nn.init.normal_(model.policy.action_net.weight)  # all layers would learn
+    before = weights(model)
+    freeze_policy(model, True)
+    model.learn(ROLLOUT)
+    assert changed(model, before) == {"value"}
+    before = weights(model)
+    freeze_policy(model, False)
+    model.learn(ROLLOUT)
+    assert changed(model, before) == {"policy", "value"}
+
+
+def test_the_noise_follows_its_schedule():
+    options, model = make(ppo=dataclasses.replace(PPO, log_std=(-1.0, -2.0)))
+    for steps, expected in ((0, -1.0), (250, -1.25), (1000, -2.0), (1500, -2.0)):
+        model.num_timesteps = steps
+        set_noise(model, options)
+        assert model.policy.log_std.tolist() == [expected, expected]
+
+
+@pytest.mark.parametrize(
+    ("inputs", "axes"),
+    [("all", AXES), ("command", ("vertical",)), ("all", ("forward", "vertical"))],
+)
+def test_the_exported_policy_acts_as_the_model(rng, inputs, axes):
+    """On the whole observation, on all axes, and with actions of the scale; no torch."""
+    options, model = make(inputs=inputs, axes=axes)
+    with torch.no_grad():
+        for parameter in model.policy.parameters():
+            parameter.copy_(torch.tensor(rng.normal(0, 0.5, parameter.shape)))
+    names = list(entry_scales())
+    columns = [names.index(name) for name in options.input_names]
+    rows = [AXES.index(axis) for axis in axes]
+    policy = export(model, options, 0.5)
+    observations = rng.uniform(-2, 2, (200, 80)).astype(np.float32)
+    ours = np.array([policy(observation) for observation in observations])
+    theirs, _ = model.predict(observations[:, columns], deterministic=True)
+    assert 0 < (np.abs(theirs) == 1).mean() < 1  # some are clipped, not all
+    np.testing.assert_allclose(ours[:, rows], 0.5 * theirs, rtol=0, atol=1e-6)
+    assert not np.delete(ours, rows, axis=1).any()
+    assert ours.dtype == np.float32
+
+    with torch.no_grad():  # learning goes on; what was exported stays
+        model.policy.action_net.weight.zero_()
+    assert np.array_equal(policy(observations[0]), ours[0])
+
+
+def test_a_jump_of_the_exported_policy_is_the_one_trained_on(rng):
+    """What the environment makes of the model's actions, and the plain one of the policy's."""
+    options, model = make(axes=("vertical",))
+    torch.nn.init.normal_(model.policy.action_net.weight)
+    (env,) = model.get_env().envs
+    env.scale_actions(0.5)
+    policy = export(model, options, 0.5)
+    observation, _ = env.reset(seed=5)
+    plain = make_env(options.env)
+    whole, _ = plain.reset(seed=5)
+    for _ in range(acting_steps(options.env) - 1):
+        np.testing.assert_allclose(observation, whole, rtol=0, atol=1e-4)
+        observation, *_ = env.step(model.predict(observation, deterministic=True)[0])
+        whole, *_ = plain.step(policy(whole))
+    assert np.abs(whole[list(entry_scales()).index("residual_offset.z")]) > 0.01

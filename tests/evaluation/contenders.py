@@ -1,0 +1,48 @@
+"""Policies and episodes that several tests of the evaluation use."""
+
+import numpy as np
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.metrics.jump import JumpMetrics
+from icub_jump_env.policy import NetworkPolicy, save_policy
+
+FEEDBACK = NetworkPolicy(
+    ("gyro.y", "com_velocity.x", "time"),
+    ((np.array([[0.2, 0.3, 0.5], [-0.3, 0.1, -0.4]], np.float32), np.zeros(2, np.float32)),),
+    ("forward", "vertical"),
+    0.3,
+)
+"""A policy whose action changes from step to step."""
+
+
+def constant(*action):
+    """The network that always does the same."""
+    return NetworkPolicy((), ((np.zeros((3, 0), np.float32), np.array(action, np.float32)),))
+
+
+def save(path, policy, **config):
+    """A policy on disk, trained in the environment of ``config``."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_policy(
+        path, policy, config=JumpConfig(**config), versions={}, command=(), seed=0, results={}
+    )
+    return path
+
+
+def save_constant(path, *action, **config):
+    return save(path, constant(*action), **config)
+
+
+def episode(seed, failure=None, jump_height=0.04, **jump):
+    """An episode that nobody jumped."""
+    return Episode(
+        seed=seed,
+        jump_height=jump_height,
+        outcome="stood" if failure is None else "fell",
+        is_success=failure is None,
+        reward=2.5,
+        jump=JumpMetrics().as_dict() | {"landed": failure is None} | jump,
+        failure=failure,
+        world={"friction": 0.5},
+    )

@@ -1,0 +1,414 @@
+"""``eval.py --compare``: pairs of episodes, and what follows from them."""
+
+import io
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contenders import FEEDBACK, episode, save, save_constant
+from matplotlib.colors import to_rgba
+from rich.console import Console
+from scipy.stats import binom
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation import cli, compare, series
+from icub_jump_env.evaluation.compare import (
+    Difference,
+    Summary,
+    bootstrap_interval,
+    by_command,
+    render,
+)
+from icub_jump_env.evaluation.compare_figure import compare_figure
+from icub_jump_env.evaluation.failures import Failure
+from icub_jump_env.evaluation.rollout import make_env, run_episode
+from icub_jump_env.evaluation.statistics import Rate
+
+
+def outcomes(pattern, rise=0.04, **jump):
+    """Episodes that succeed where the pattern has a 1."""
+    return [
+        episode(seed, None if char == "1" else Failure.SLIPPED, flight_height=rise, **jump)
+        for seed, char in enumerate(pattern)
+    ]
+
+
+class TestSummary:
+    def test_numbers(self):
+        episodes = [
+            episode(0, flight_height=0.04, flight_rotation=-0.1, landing_force=900.0, joint_work=90.0),
+            episode(1, flight_height=0.05, flight_rotation=0.3, landing_force=1000.0, joint_work=80.0),
+            episode(2, jump_height=0.05, flight_height=0.03, flight_rotation=0.2, landing_force=800.0, joint_work=100.0),
+            episode(3, Failure.NO_TAKEOFF, jump_height=0.05, joint_work=10.0),
+            episode(4, Failure.TOO_LOW, landed=True, flight_height=0.02, flight_rotation=-0.2, landing_force=700.0, joint_work=70.0),
+        ]  # fmt: skip
+        found = Summary.of(episodes)
+        assert (found.success, found.landed) == (Rate(3, 5), Rate(4, 5))
+        assert found.rise == pytest.approx((4 + 5 + 3 + 0 + 2) / 500)
+        assert found.height_error == pytest.approx((0 + 1 + 2 + 5 + 2) / 500)
+        # Without a flight there is neither a rotation nor a landing.
+        assert found.rotation == pytest.approx(0.2)
+        assert found.landing_force == pytest.approx(850.0)
+        assert found.joint_work == pytest.approx(80.0)
+
+    def test_where_nobody_flew(self):
+        found = Summary.of([episode(0, Failure.NO_TAKEOFF)])
+        assert math.isnan(found.rotation)
+        assert math.isnan(found.landing_force)
+        assert found.rise == 0.0
+
+    def test_wilson_interval_by_hand(self):
+        """For 8 of 10: (8 + z^2/2 +- z sqrt(8 * 2 / 10 + z^2/4)) / (10 + z^2)."""
+        z2 = 1.959964**2
+        middle, half = 8 + z2 / 2, math.sqrt(z2 * (1.6 + z2 / 4))
+        expected = (middle - half) / (10 + z2), (middle + half) / (10 + z2)
+        found = Summary.of(outcomes("1101111011")).as_dict()["success"]
+        assert found["interval"] == pytest.approx(expected, abs=1e-6)
+        assert (found["count"], found["total"]) == (8, 10)
+
+
+class TestDifference:
+    ours, theirs = outcomes("1111111100", rise=0.05), outcomes("0000000010", rise=0.047)
+
+    def test_counts_and_mcnemar_by_hand(self):
+        """8 won and 1 lost of 9: twice the chance of at most 1 head in 9 tosses."""
+        found = Difference.of(self.ours, self.theirs)
+        assert (found.won, found.lost) == (8, 1)
+        assert found.p_value == pytest.approx(2 * (1 + 9) / 2**9)
+        assert found.success == pytest.approx(0.7)
+        assert found.rise == pytest.approx(0.003)
+
+    def test_the_other_way_round_the_signs_turn(self):
+        there, back = (
+            Difference.of(*pair) for pair in ((self.ours, self.theirs), (self.theirs, self.ours))
+        )
+        assert (back.won, back.lost) == (there.lost, there.won)
+        assert back.p_value == there.p_value
+        assert (back.success, back.rise) == (-there.success, -there.rise)
+        assert back.success_interval == pytest.approx([-b for b in there.success_interval[::-1]])
+
+    @pytest.mark.parametrize(("won", "lost"), [(1, 0), (5, 5), (9, 2), (20, 3)])
+    def test_mcnemar_against_the_binomial_distribution(self, won, lost):
+        """Episodes that end alike do not count."""
+        ours = outcomes("1" * won + "0" * lost + "11110000")
+        theirs = outcomes("0" * won + "1" * lost + "11110000")
+        expected = min(1.0, 2 * binom.cdf(min(won, lost), won + lost, 0.5))
+        assert Difference.of(ours, theirs).p_value == pytest.approx(expected)
+
+    def test_of_a_contender_against_itself(self):
+        found = Difference.of(self.ours, self.ours)
+        assert (found.won, found.lost, found.p_value) == (0, 0, 1.0)
+        assert (found.success, found.rise) == (0.0, 0.0)
+        assert found.success_interval == found.rise_interval == (0.0, 0.0)
+
+    def test_pairs_count_not_groups(self):
+        """Rises that scatter much more than they differ: the pairs show the difference."""
+        heights = np.linspace(0.02, 0.08, 50)
+        gains = 0.001 + 0.0005 * np.sin(np.arange(50))
+        theirs = [episode(seed, flight_height=h) for seed, h in enumerate(heights)]
+        ours = [episode(seed, flight_height=h) for seed, h in enumerate(heights + gains)]
+        low, high = Difference.of(ours, theirs).rise_interval
+        assert 0.0008 < low < gains.mean() < high < 0.0012
+
+    def test_intervals_against_the_normal_distribution(self, rng):
+        gains = rng.choice([-1, 0, 1], 400, p=[0.1, 0.6, 0.3])
+        half = 1.96 * gains.std() / math.sqrt(400)
+        expected = gains.mean() - half, gains.mean() + half
+        assert bootstrap_interval(gains) == pytest.approx(expected, abs=0.1 * half)
+        assert bootstrap_interval(gains) == bootstrap_interval(gains)
+
+    def test_an_interval_may_be_of_another_statistic(self, rng):
+        values = rng.exponential(size=101)
+        low, high = bootstrap_interval(values, np.median)
+        assert low < np.median(values) < high < values.mean() + 0.3
+        assert (low, high) != bootstrap_interval(values)
+
+    def test_lists_of_different_length_are_no_pairs(self):
+        with pytest.raises(ValueError, match="zip"):
+            Difference.of(self.ours[:-1], self.theirs)
+
+    def test_in_words(self):
+        line = str(Difference.of(self.ours, self.theirs))
+        assert line.startswith("success +70.0 points (95 % interval +30.0 to +100.0; ")
+        assert "won 8, lost 1, McNemar p = 0.039" in line
+        assert "rise +0.30 cm (+0.30 to +0.30)" in line
+        worse = str(Difference.of(outcomes("0" * 20), outcomes("1" * 20, rise=0.0412)))
+        assert "success -100.0 points (95 % interval -100.0 to -100.0;" in worse
+        assert "McNemar p < 0.001" in worse
+        assert "rise -0.12 cm" in worse
+
+
+class TestByCommand:
+    @pytest.mark.parametrize("centimetres", range(1, 16))
+    def test_a_whole_number_of_centimetres_begins_a_group(self, centimetres):
+        """Also where rounding puts it a little below."""
+        height = centimetres / 100
+        for rounded in (height, math.nextafter(height, 0.0), math.nextafter(height, 1.0)):
+            groups = by_command([episode(0, jump_height=rounded)])
+            assert list(groups) == [(centimetres, centimetres + 1)]
+
+    @pytest.mark.parametrize(
+        ("height", "group"),
+        [(0.05, (5, 6)), (0.15 - 0.1, (5, 6)), (0.0499, (4, 5)), (0.0599999, (5, 6))],
+    )
+    def test_between_the_edges(self, height, group):
+        assert list(by_command([episode(0, jump_height=height)])) == [group]
+
+    def test_every_episode_is_in_one_group_and_groups_ascend(self):
+        heights = [0.072, 0.031, 0.05, 0.039, 0.055, 0.07]
+        episodes = [episode(seed, jump_height=h) for seed, h in enumerate(heights)]
+        groups = by_command(episodes)
+        assert {key: [e.seed for e in group] for key, group in groups.items()} == {
+            (3, 4): [1, 3], (5, 6): [2, 4], (7, 8): [0, 5],
+        }  # fmt: skip
+        assert list(groups) == sorted(groups)
+
+
+def two_ranges(pattern, rise):
+    """Four episodes at 4 cm, then four at 6 cm."""
+    return [
+        episode(
+            seed, None if char == "1" else Failure.SLIPPED, jump_height=0.04 if seed < 4 else 0.06,
+            flight_height=rise, flight_rotation=0.1, landing_force=1000.0, joint_work=100.0,
+        )
+        for seed, char in enumerate(pattern)
+    ]  # fmt: skip
+
+
+ARMS = {"first": two_ranges("11101100", 0.04), "second": two_ranges("11111110", 0.05)}
+
+
+def printed(table):
+    console = Console(file=io.StringIO(), width=200)
+    console.print(table)
+    return [line.split("  ") for line in console.file.getvalue().splitlines()]
+
+
+class TestTable:
+    def test_a_row_for_each_command_and_contender_and_for_all(self):
+        rows = [[cell.strip() for cell in row if cell.strip()] for row in printed(render(ARMS))]
+        for expected in (
+            ["4 to 5 cm", "first", "75.0 %", "30.1 to 95.4", "75.0 %"],
+            ["second", "100.0 %", "51.0 to 100.0", "100.0 %"],
+            ["6 to 7 cm", "first", "50.0 %", "15.0 to 85.0"],
+            ["second", "75.0 %", "30.1 to 95.4"],
+            ["all", "first", "62.5 %", "30.6 to 86.3"],
+            ["second", "87.5 %", "52.9 to 97.8"],
+        ):
+            assert any(row[: len(expected)] == expected for row in rows), expected
+        assert rows[1][:2] == ["command", "policy"]
+        (last,) = [row for row in rows if row[:2] == ["second", "87.5 %"]]
+        assert last[4:] == ["5.00", "1.00", "5.7", "1000", "100"]
+
+    def test_one_command_needs_no_row_for_all(self):
+        text = str(printed(render({name: arm[:4] for name, arm in ARMS.items()})))
+        assert "4 to 5 cm" in text
+        assert "all'" not in text
+
+
+class TestFigure:
+    def test_bars_are_the_success_rates_with_their_intervals(self):
+        left, _ = compare_figure(ARMS).axes
+        assert [label.get_text() for label in left.get_xticklabels()] == ["4 to 5", "6 to 7"]
+        assert (left.get_xlabel(), left.get_ylabel()) == ("command (cm)", "success (%)")
+        shown = [text.get_text() for text in left.get_legend().get_texts()]
+        assert shown == ["first", "second"]
+        bars = {c.get_label(): c for c in left.containers if hasattr(c, "patches")}
+        for name, counts in (("first", (3, 2)), ("second", (4, 3))):
+            assert [bar.get_height() for bar in bars[name]] == [25.0 * n for n in counts]
+            (stems,) = bars[name].errorbar.lines[2]
+            ends = [segment[:, 1] for segment in stems.get_segments()]
+            intervals = [100 * np.array(Rate(n, 4).interval) for n in counts]
+            np.testing.assert_allclose(ends, intervals, atol=1e-9)
+        first, second = (bars[name].patches[0] for name in ("first", "second"))
+        assert first.get_x() + first.get_width() <= second.get_x()
+        assert first.get_facecolor() != second.get_facecolor()
+
+    def test_points_are_the_episodes(self):
+        left, right = compare_figure(ARMS).axes
+        assert (right.get_xlabel(), right.get_ylabel()) == ("command (cm)", "CoM rise (cm)")
+        *points, command, least = right.lines
+        bars = [c for c in left.containers if hasattr(c, "patches")]
+        for number, (arm, bar) in enumerate(zip(ARMS.values(), bars, strict=True)):
+            landed, fallen = points[2 * number : 2 * number + 2]
+            for line, stood in ((landed, True), (fallen, False)):
+                shown = [e for e in arm if e.is_success == stood]
+                assert list(line.get_xdata()) == [100 * e.jump_height for e in shown]
+                assert list(line.get_ydata()) == [100 * e.jump["flight_height"] for e in shown]
+                assert to_rgba(line.get_color()) == bar.patches[0].get_facecolor()
+            assert landed.get_marker() != fallen.get_marker()
+        assert list(command.get_ydata()) == pytest.approx([4.0, 6.0])
+        assert list(least.get_ydata()) == pytest.approx([2.8, 4.2])
+        shown = [text.get_text() for text in right.get_legend().get_texts()]
+        assert shown == ["first, fallen", "second, fallen", "command", "least for a success"]
+
+
+def evaluate(capsys, *arguments):
+    """Exit code, stdout and stderr of eval.py with these arguments."""
+    code = 0
+    try:
+        cli.evaluate([str(argument) for argument in arguments])
+    except SystemExit as end:
+        code = end.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+RANDOM = {"randomization": "full", "jump_height": (0.03, 0.06), "stand_time": 0.0}
+FLAGS = ("--randomization", "full", "--jump-height", "0.03", "0.06", "--stand-time", "0")
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A policy that does nothing, and one that does something."""
+    return (
+        save_constant(tmp_path / "idle.safetensors", 0, 0, 0),
+        save(tmp_path / "busy.safetensors", FEEDBACK),
+    )
+
+
+@pytest.fixture
+def asked(files):
+    return ["--compare", "baseline", *files, *FLAGS, "--episodes", "3", "--seed", "5"]
+
+
+def logs():
+    """Header and episodes of each contender, by its name."""
+    contents = {}
+    for path in Path("results").glob("*.jsonl"):
+        header, *episodes = map(json.loads, path.read_text().splitlines())
+        contents[header["policy"]["name"]] = header, episodes
+    return contents
+
+
+class TestCommand:
+    def test_all_meet_the_same_worlds_and_commands(self, capsys, asked):
+        code, *_ = evaluate(capsys, *asked)
+        assert code == 0
+        found = {name: episodes for name, (_, episodes) in logs().items()}
+        assert sorted(found) == ["baseline", "busy", "idle"]
+        for name in ("idle", "busy"):
+            for entry in ("seed", "world", "jump_height"):
+                assert [e[entry] for e in found[name]] == [e[entry] for e in found["baseline"]]
+        baseline = found["baseline"]
+        assert [e["seed"] for e in baseline] == [5, 6, 7]
+        assert len({e["jump_height"] for e in baseline}) == 3
+        assert len({e["world"]["friction"] for e in baseline}) == 3
+        assert found["idle"] == baseline
+        env = make_env(JumpConfig(**RANDOM))
+        for policy, name in (((), "baseline"), ((FEEDBACK,), "busy")):
+            expected = [run_episode(env, seed, *policy) for seed in (5, 6, 7)]
+            assert [e["jump"]["flight_height"] for e in found[name]] == [
+                e.jump["flight_height"] for e in expected
+            ]
+
+    def test_says_writes_and_draws_what_was_found(self, capsys, asked):
+        code, out, err = evaluate(capsys, *asked, "--json", "r.json", "--plot", "figures")
+        assert code == 0
+        assert Path("figures/compare.png").stat().st_size > 10_000
+        for output in ("r.json", "figures/compare.png"):
+            assert f"wrote {output}" in err
+        content = json.loads(Path("r.json").read_text(), parse_constant=pytest.fail)
+        assert (content["mode"], content["episodes"], content["seed"]) == ("compare", 3, 5)
+        assert content["config"]["jump_height"] == [0.03, 0.06]
+        assert list(content["contenders"]) == ["baseline", "idle", "busy"]
+        found = {name: episodes for name, (_, episodes) in logs().items()}
+        for name, contender in content["contenders"].items():
+            rises = [e["jump"]["flight_height"] for e in found[name]]
+            assert contender["all"]["mean_rise"] == pytest.approx(np.mean(rises))
+            assert contender["all"]["success"]["total"] == 3
+            assert contender["name"] == name
+            for group in contender["by_command"]:
+                low, high = group["jump_height"]
+                inside = [e for e in found[name] if low <= e["jump_height"] < high]
+                assert group["landed"]["total"] == len(inside) > 0
+        assert [content["contenders"][n]["sha256"] is None for n in content["contenders"]] == [
+            True, False, False,
+        ]  # fmt: skip
+        differences = content["differences"]
+        assert list(differences) == ["idle", "busy"]
+        assert differences["idle"]["p_value"] == 1.0
+        assert differences["idle"]["rise_interval"] == [0.0, 0.0]
+        gains = [
+            ours["jump"]["flight_height"] - theirs["jump"]["flight_height"]
+            for ours, theirs in zip(found["busy"], found["baseline"], strict=True)
+        ]
+        assert differences["busy"]["rise"] == pytest.approx(np.mean(gains))
+
+        assert out.startswith(
+            "3 to 6 cm jump, velocity controller, randomization full, seeds 5 to 7"
+        )
+        assert (
+            "idle against baseline: success +0.0 points (95 % interval +0.0 to +0.0; won 0, "
+            "lost 0, McNemar p = 1.000), rise +0.00 cm (+0.00 to +0.00)\n" in out
+        )
+        line = next(line for line in out.splitlines() if line.startswith("busy against baseline"))
+        assert f"rise {100 * np.mean(gains):+.2f} cm" in line
+        assert not [line for line in out.splitlines() if line.startswith("baseline against")]
+
+    def test_the_first_one_is_what_the_others_are_compared_with(self, capsys, files):
+        _, out, _ = evaluate(capsys, "--compare", files[1], "baseline", *FLAGS, "--episodes", "2")
+        assert "baseline against busy: " in out
+
+    def test_resume_takes_what_the_logs_have(self, capsys, asked, monkeypatch):
+        _, expected, _ = evaluate(capsys, *asked)
+        names = sorted(path.name for path in Path("results").iterdir())
+        whole = {name: (Path("results") / name).read_bytes() for name in names}
+        (busy,) = [name for name in names if "busy" in name]
+        lines = whole[busy].splitlines(keepends=True)
+        (Path("results") / busy).write_bytes(b"".join(lines[:2]))
+        run_jobs, ran = series.run_jobs, []
+
+        def watched(work, jobs):
+            ran.extend((job.seed, job.policy) for job in work)
+            return run_jobs(work, jobs)
+
+        monkeypatch.setattr(series, "run_jobs", watched)
+        code, out, _ = evaluate(capsys, *asked, "--resume")
+        assert (code, out) == (0, expected)
+        assert [seed for seed, _ in ran] == [6, 7]
+        assert {policy.card.inputs for _, policy in ran} == {FEEDBACK.inputs}
+        assert {path.name: path.read_bytes() for path in Path("results").iterdir()} == whole
+
+        # Logs that are not there at all, as of a contender that is new, are begun.
+        (Path("results") / busy).unlink()
+        assert evaluate(capsys, *asked, "--resume")[1] == expected
+        assert [seed for seed, _ in ran[2:]] == [5, 6, 7]
+
+    def test_without_resume_earlier_logs_are_kept_and_all_is_run_again(self, capsys, asked):
+        _, expected, _ = evaluate(capsys, *asked)
+        code, out, err = evaluate(capsys, *asked)
+        assert (code, out) == (0, expected)
+        assert err.count("kept the earlier episodes") == 3
+        assert len(list(Path("results").iterdir())) == 6
+
+    def test_the_commands_of_the_training_are_the_default(self, capsys, tmp_path):
+        file = save(
+            tmp_path / "p.safetensors", FEEDBACK, jump_height=(0.03, 0.04), com_displacement=0.1
+        )
+        common = ["--compare", "baseline", file, "--stand-time", "0", "--episodes", "2"]
+        code, out, _ = evaluate(capsys, *common)
+        assert code == 0
+        assert out.startswith("3 to 4 cm jump")
+        for header, episodes in logs().values():
+            assert header["config"]["com_displacement"] == 0.1
+            assert all(0.03 <= e["jump_height"] <= 0.04 for e in episodes)
+        assert evaluate(capsys, *common, "--jump-height", "0.05")[1].startswith("5 cm jump")
+
+    def test_policies_of_different_environments_are_refused(self, capsys, tmp_path, files):
+        other = save(tmp_path / "other.safetensors", FEEDBACK, com_displacement=0.1)
+        code, out, err = evaluate(capsys, "--compare", *files, other, "--episodes", "2")
+        assert (code, out) == (2, "")
+        assert err.startswith("error: ")
+        assert err.count("\n") == 1
+        assert "com_displacement=None instead of 0.1" in err
+
+    def test_no_episode_is_run_if_there_can_be_no_workers(self, capsys, asked, monkeypatch):
+        monkeypatch.setitem(sys.modules, "ray", None)
+        monkeypatch.setattr(compare, "run_contenders", lambda *_: pytest.fail("should not jump"))
+        code, _, err = evaluate(capsys, *asked, "--jobs", "2")
+        assert code == 2
+        assert "icub-jump[parallel]" in err

@@ -1,0 +1,73 @@
+"""When the residual acts: in the launch, or in all phases."""
+
+import numpy as np
+import pytest
+from conftest import ZERO, jump
+
+from icub_jump_env import JumpConfig
+from icub_jump_env.control.phases import Phase
+from icub_jump_env.evaluation.rollout import make_env
+
+SHIFT = np.array([0.4, 0.2, -0.5], np.float32)
+
+
+def after_the_launch(action, phases):
+    """Observations and costs of an episode whose launch is the baseline's."""
+    env = make_env(JumpConfig(stand_time=0.4, residual_phases=phases))
+    env.reset(seed=0)
+    observations, costs, terminated, phase = [], [], False, "launch"
+    while not terminated:
+        acting = ZERO if phase == "launch" else action
+        observation, _, terminated, _, info = env.step(acting)
+        if phase != "launch":
+            observations.append(observation)
+            costs.append(info["reward_residual"])
+        phase = info["phase"]
+    env.close()
+    return np.array(observations), costs
+
+
+def test_without_residual_the_phases_make_no_difference():
+    assert jump(residual_phases="all") == jump(residual_phases="launch")
+
+
+def test_in_the_launch_alone_later_actions_do_and_cost_nothing():
+    without, _ = after_the_launch(ZERO, "launch")
+    shifted, costs = after_the_launch(SHIFT, "launch")
+    assert (shifted == without).all()
+    assert set(costs) == {0.0}
+
+
+def test_in_all_phases_later_actions_move_the_robot_and_cost():
+    without, _ = after_the_launch(ZERO, "all")
+    shifted, costs = after_the_launch(SHIFT, "all")
+    assert len(without) > 0
+    assert not (shifted[-1] == without[-1]).all()
+    assert costs == pytest.approx([-0.001 * float(SHIFT @ SHIFT)] * len(costs))
+
+
+def test_the_posture_follows_the_residual_to_the_shift_of_the_com():
+    """At rest the joints have moved as far as it takes to shift the CoM over resting feet."""
+    env = make_env(JumpConfig(residual_phases="all"))
+    env.reset(seed=0)
+    controller, sensors = env._controller, env._simulation.sensors
+    controller.phases.phase = Phase.LANDING
+    commands = []
+    for target in (np.zeros(3), np.array([0.01, 0.004, -0.01])):
+        for tick in range(400):
+            tick = controller.tick(
+                1.0 + 0.005 * tick,
+                env._estimator,
+                sensors.joint_position,
+                sensors.joint_velocity,
+                300.0,
+                target,
+            )
+        commands.append(tick.command.position.copy())
+    kinematics = env._estimator.kinematics
+    coms = []
+    for posture in commands:
+        kinematics.update(posture)
+        coms.append(kinematics.com.copy())
+    assert coms[1] - coms[0] == pytest.approx([0.01, 0.004, -0.01], abs=5e-4)
+    env.close()
