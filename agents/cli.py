@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import shlex
 from collections.abc import Sequence
@@ -12,7 +11,7 @@ from rich.console import Console
 
 from agents.options import OPTIONS, TrainOptions, read_options
 from icub_jump_env.errors import ConfigError, MissingDependencyError
-from icub_jump_env.evaluation.cli import guarded, parse
+from icub_jump_env.evaluation.cli import guarded, parse, seek
 from icub_jump_env.evaluation.output import say
 
 _REMEDY = (
@@ -47,18 +46,13 @@ def _default(arguments: Sequence[str]) -> TrainOptions | None:
 
     Found before the rest is parsed: whether that fits together depends on it.
     """
-    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
-    parser.add_argument("--config", type=Path)
-    parser.add_argument("--resume", type=Path)
-    try:
-        files, _ = parser.parse_known_args(arguments)
-    except argparse.ArgumentError:
-        return None  # who parses all of it finds better words
-    if files.resume is None:
-        return None if files.config is None else read_options(files.config)
-    if files.config is not None:
-        raise ConfigError("config", str(files.config), "not with --resume")
-    file = files.resume / OPTIONS
+    found = seek(arguments, "config", "resume")
+    if "resume" not in found:
+        return read_options(Path(found["config"][0])) if "config" in found else None
+    folder = Path(found["resume"][0])
+    if "config" in found:
+        raise ConfigError("config", found["config"][0], "not with --resume")
+    file = folder / OPTIONS
     if not file.is_file():
-        raise ConfigError("resume", str(files.resume), "the folder of a run")
-    return dataclasses.replace(read_options(file), resume=files.resume)
+        raise ConfigError("resume", str(folder), "the folder of a run")
+    return dataclasses.replace(read_options(file), resume=folder)

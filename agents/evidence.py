@@ -9,6 +9,7 @@ fills agents/pretrained/, draws the learning curves, and runs docs/update.py.
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 import subprocess
 import sys
@@ -16,7 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
-import tyro
 from rich.console import Console
 
 from agents.arms import best_constant, open_loop
@@ -24,7 +24,8 @@ from agents.curves import learning_curves
 from agents.options import OPTIONS
 from agents.training import BEST, CURVE
 from icub_jump_env.config import ControllerName
-from icub_jump_env.evaluation.cli import guarded
+from icub_jump_env.errors import ICubJumpError
+from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.output import say
 from icub_jump_env.evaluation.provenance import versions
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
@@ -46,13 +47,17 @@ ABLATIONS = {
 """Arguments of train.py that make each ablation."""
 
 
+class EvidenceError(ICubJumpError, RuntimeError):
+    """A part of the evidence could not be remade."""
+
+
 @dataclass(frozen=True)
 class EvidenceOptions:
     """Remake the evidence.
 
     Attributes:
         jobs: Processes that evaluate in parallel.
-        train_only: Leave the documents as they are.
+        train_only: Train, and leave shipped policies and documents as they are.
     """
 
     jobs: int = 1
@@ -77,7 +82,7 @@ def _train(name: str, arguments: tuple[str, ...], console: Console) -> None:
     words = (*arguments, "--run", str(folder))
     if (folder / OPTIONS).exists():
         words = ("--resume", str(folder))
-    subprocess.run([sys.executable, "train.py", *words], check=True)
+    _run("train.py", *words)
     kept = PRETRAINED / "runs"
     kept.mkdir(parents=True, exist_ok=True)
     for suffix in (".safetensors", ".json"):
@@ -85,12 +90,23 @@ def _train(name: str, arguments: tuple[str, ...], console: Console) -> None:
     shutil.copy(folder / CURVE, kept / f"{name}.curve.json")
 
 
-def _ship(controller: ControllerName, jobs: int, console: Console) -> None:
-    """The best of the headline runs, and its rivals."""
+def _run(*words: str) -> None:
+    try:
+        subprocess.run([sys.executable, *words], check=True)
+    except subprocess.CalledProcessError as error:
+        raise EvidenceError(f"failed: python {shlex.join(words)}") from error
+
+
+def _ship(controller: ControllerName) -> None:
+    """The best of the headline runs."""
     candidates = [PRETRAINED / "runs" / f"{controller}-seed{seed}.json" for seed in HEADLINE_SEEDS]
     best = max(candidates, key=_score)
     for suffix in (".safetensors", ".json"):
         shutil.copy(best.with_suffix(suffix), PRETRAINED / f"{controller}{suffix}")
+
+
+def _make_rivals(controller: ControllerName, jobs: int, console: Console) -> None:
+    """A constant shift and the shipped policy's mean action, in the same format."""
     policy = load_policy(PRETRAINED / f"{controller}.safetensors")
     config = policy.card.config
     rivals: dict[str, NetworkPolicy | ReplayPolicy] = {
@@ -118,12 +134,14 @@ def remake(options: EvidenceOptions) -> None:
     console = Console(stderr=True)
     for name, arguments in runs().items():
         _train(name, arguments, console)
+    if options.train_only:
+        return
     for controller in get_args(ControllerName):
-        _ship(controller, options.jobs, console)
+        _ship(controller)
+        _make_rivals(controller, options.jobs, console)
     learning_curves(PRETRAINED / "runs").savefig(IMAGES / "learning.png")
-    if not options.train_only:
-        subprocess.run([sys.executable, "docs/update.py"], check=True)
+    _run("docs/update.py")
 
 
 if __name__ == "__main__":
-    guarded(lambda: remake(tyro.cli(EvidenceOptions)))
+    guarded(lambda: remake(parse(EvidenceOptions, sys.argv[1:])))

@@ -9,11 +9,11 @@ commands, all on the same episodes. An interrupted run goes on where it stopped.
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
 from matplotlib.figure import Figure
 from rich import box
 from rich.console import Console
@@ -22,7 +22,7 @@ from rich.table import Table
 from agents.options import TASK
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
-from icub_jump_env.evaluation.cli import guarded
+from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.compare import Summary
 from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.output import say, show
@@ -151,4 +151,4 @@ def frontier_figure(points: Sequence[Point]) -> Figure:
 
 
 if __name__ == "__main__":
-    guarded(lambda: frontier(tyro.cli(FrontierOptions)))
+    guarded(lambda: frontier(parse(FrontierOptions, sys.argv[1:])))

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import sys
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +20,6 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
-import tyro
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -28,7 +28,7 @@ from scipy.stats import trim_mean
 from agents.options import TASK
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName, JumpConfig
-from icub_jump_env.evaluation.cli import guarded
+from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.compare import Summary, bootstrap_interval
 from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.output import show
@@ -111,4 +111,4 @@ def _summary(
 
 
 if __name__ == "__main__":
-    guarded(lambda: study(tyro.cli(StudyOptions)))
+    guarded(lambda: study(parse(StudyOptions, sys.argv[1:])))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import dataclasses
 import io
@@ -86,6 +87,21 @@ def parse(kind: type[T], arguments: Sequence[str], default: T | None = None) -> 
         _fail(_one_line(page.read()))
 
 
+def seek(arguments: Sequence[str], *flags: str) -> dict[str, list[str]]:
+    """The words after some flags, found before the rest of a command line is parsed.
+
+    For files that say what holds where the command line says nothing.
+    """
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    for flag in flags:
+        parser.add_argument(f"--{flag}", nargs="+")
+    try:
+        found, _ = parser.parse_known_args(arguments)
+    except argparse.ArgumentError:
+        return {}  # who parses all of it finds better words
+    return {flag: words for flag, words in vars(found).items() if words is not None}
+
+
 def guarded(main: Callable[[], None]) -> None:
     """Run ``main``; any error that we foresee ends with one line and a non-zero exit."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -104,7 +120,7 @@ def evaluate(arguments: Sequence[str]) -> None:
 
 
 def _evaluate(arguments: Sequence[str]) -> None:
-    options = parse(EvalOptions, arguments)
+    options = parse(EvalOptions, arguments, _as_trained(arguments))
     import_mujoco()
     # Imported here, like the modes, so that --help and bad arguments answer at once.
     from icub_jump_env.evaluation.output import check_writable, say
@@ -121,10 +137,13 @@ def _evaluate(arguments: Sequence[str]) -> None:
         check_video(options.video)
 
     from icub_jump_env.evaluation.contender import read_contenders
+    from icub_jump_env.policy import check_match
 
     words = options.compare or (options.policy or "baseline",)
     contenders = read_contenders([str(word) for word in words])
-    options = _set_up_as_trained(arguments, options, contenders)
+    for contender in contenders:
+        if contender.card is not None:
+            check_match(contender.card, options.config)
     console, progress = Console(), Console(stderr=True)
     _run_mode(options, contenders, console, progress)
     if options.video is not None:
@@ -133,27 +152,23 @@ def _evaluate(arguments: Sequence[str]) -> None:
         say(console, f"wrote {options.video}")
 
 
-def _set_up_as_trained(
-    arguments: Sequence[str], options: EvalOptions, contenders: Sequence[Contender]
-) -> EvalOptions:
-    """The options with the jump that the policies were trained for, where nothing else is said.
+def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
+    """The jump that the policies of a command line were trained for, if there are any."""
+    found = seek(arguments, "compare", "policy")
+    if not found:
+        return None
+    from icub_jump_env.evaluation.contender import as_trained, read_contenders
 
-    Raises:
-        PolicyMismatchError: If something else is said that a policy depends on.
-    """
-    from icub_jump_env.evaluation.contender import as_trained
-    from icub_jump_env.policy import check_match
-
+    contenders = read_contenders(found.get("compare") or found["policy"])
     cards = [contender.card for contender in contenders if contender.card is not None]
     if not cards:
-        return options
+        return None
     config = as_trained(cards[0])
-    if options.compare:
+    if "compare" in found:
         config = dataclasses.replace(config, jump_height=cards[0].config.jump_height)
-    options = parse(EvalOptions, arguments, EvalOptions(config=config))
-    for card in cards:
-        check_match(card, options.config)
-    return options
+        # A range of commands is for this mode alone.
+        return EvalOptions(config=config, compare=tuple(found["compare"]))
+    return EvalOptions(config=config)
 
 
 def _run_mode(

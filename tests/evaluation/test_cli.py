@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from contenders import save_constant
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
@@ -182,7 +183,12 @@ def test_flags_reach_the_configuration():
         (["--policy", "p.json", "--plot", "figures"], ["plot", "figures", "--policy"]),
     ],
 )
-def test_refuses_with_one_line_that_names_the_reason(capsys, arguments, words):
+def test_refuses_with_one_line_that_names_the_reason(
+    capsys, monkeypatch, tmp_path, arguments, words
+):
+    monkeypatch.chdir(tmp_path)
+    for name in {word for word in arguments if word.endswith(".json") and "/" not in word}:
+        save_constant(tmp_path / name, 0, 0, 0)
     code, out, err = evaluate(capsys, *arguments)
     assert code == 2
     assert out == ""
