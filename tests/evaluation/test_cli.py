@@ -174,7 +174,7 @@ def test_flags_reach_the_configuration():
         ),
         (["--compare"], ["compare", "two or more"]),
         (["--compare", "baseline"], ["compare", "baseline", "two or more"]),
-        (["--compare", "p.json", "baseline", "p.json"], ["compare", "p.json", "each once"]),
+        (["--compare", "p.json", "baseline", "p.json"], ["compare", "p.json", "different names"]),
         (["--compare", "a.json", "b.json", "--policy", "c.json"], ["policy", "--compare"]),
         (["--compare", "a.json", "b.json", "--results", "r"], ["results", "--compare"]),
         (["--policy", "p.json", "--sweep"], ["policy", "--sweep"]),
