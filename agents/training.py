@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import json
 import math
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -147,8 +148,12 @@ def _learn(
             restore(model, checkpoint)
             run.resume(checkpoint.number, checkpoint.progress)
             say(console, f"going on from step {model.num_timesteps} of {options.timesteps}")
-        remaining = options.timesteps - model.num_timesteps
+        start, before = time.monotonic(), model.num_timesteps
+        remaining = options.timesteps - before
         model.learn(remaining, callback=run, reset_num_timesteps=checkpoint is None)
+    wall = time.monotonic() - start
+    rate = (model.num_timesteps - before) / wall
+    say(console, f"{wall / 60:.1f} min, {rate:.0f} steps/s, evaluations included")
 
 
 class _Run(BaseCallback):
