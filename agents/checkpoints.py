@@ -189,7 +189,10 @@ def _load(path: Path, number: int) -> Checkpoint:
     del card["sha256"]
     if not np.array_equal(arrays.pop(_FINGERPRINT, ()), _fingerprint(card)):
         raise PolicyFileError(str(path.with_suffix(".json")), "damaged")
-    return Checkpoint(number, arrays, **card)
+    try:
+        return Checkpoint(number, arrays, **card)
+    except TypeError:
+        raise PolicyFileError(str(path.with_suffix(".json")), "of another version") from None
 
 
 def _fingerprint(card: Mapping[str, Any]) -> NDArray[np.uint8]:

@@ -12,6 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.jump import RESIDUAL_TIME
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
 from icub_jump_env.observation import OBSERVATION_LIMIT, entry_scales
@@ -20,11 +21,6 @@ from icub_jump_env.policy.fields import AXES
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 
 Array = NDArray[np.float32]
-
-
-LANDING_TIME = 0.7
-"""How long (s) an agent acts after the launch, if it acts in all phases: a flight takes
-0.2 s, and after half a second on the ground most has happened."""
 
 
 def acting_steps(config: JumpConfig) -> int:
@@ -38,7 +34,7 @@ def acting_steps(config: JumpConfig) -> int:
         for height in config.jump_heights
     )
     if config.residual_phases == "all":
-        longest += LANDING_TIME
+        longest += RESIDUAL_TIME
     return math.ceil(longest * config.agent_frequency)
 
 

@@ -78,7 +78,7 @@ def runs() -> dict[str, tuple[str, ...]]:
 
 def _train(name: str, arguments: tuple[str, ...], console: Console) -> None:
     say(console, f"run {name}")
-    folder = Path("runs") / name
+    folder = Path("runs/evidence") / name
     words = (*arguments, "--run", str(folder))
     if (folder / OPTIONS).exists():
         words = ("--resume", str(folder))

@@ -28,9 +28,10 @@ from scipy.stats import trim_mean
 from agents.options import TASK
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName, JumpConfig
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.compare import Summary, bootstrap_interval
-from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
+from icub_jump_env.evaluation.contender import BASELINE, Contender, as_trained, read_contenders
 from icub_jump_env.evaluation.output import show
 from icub_jump_env.evaluation.series import Series
 from icub_jump_env.evaluation.table import CM
@@ -64,6 +65,8 @@ class StudyOptions:
 def study(options: StudyOptions) -> None:
     """Evaluate all runs and print the table."""
     console, progress = Console(), Console(stderr=True)
+    if not any(RUNS.glob("*.safetensors")):
+        raise ConfigError("runs", str(RUNS), "a folder with policies: python -m agents.evidence")
     groups = defaultdict(list)
     for contender in read_contenders([str(file) for file in sorted(RUNS.glob("*.safetensors"))]):
         if match := _NAME.fullmatch(contender.name):
@@ -80,9 +83,11 @@ def study(options: StudyOptions) -> None:
 
 
 def _config(contender: Contender) -> JumpConfig:
-    """The task of the headline runs, with the controller of this policy."""
+    """The worlds and commands of the headline runs, and what this policy depends on."""
     assert contender.card is not None  # it was read from a file
-    return dataclasses.replace(TASK, controller=contender.card.config.controller)
+    return dataclasses.replace(
+        as_trained(contender.card), jump_height=TASK.jump_height, randomization=TASK.randomization
+    )
 
 
 def _add(table: Table, name: str, summaries: Sequence[Summary]) -> None:

@@ -211,7 +211,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._outcome == "not reset":
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         action64 = check_action(action)
-        if self.config.residual_phases == "launch" and not self._launching:
+        if not self._controller.residual_acts(self._simulation.physics.data.time):
             action64 = np.zeros(3)  # has no effect and costs nothing
         target = action64 * self._residual_scale
         self._report = IDLE

@@ -5,15 +5,16 @@ import pytest
 from conftest import ZERO, jump
 
 from icub_jump_env import JumpConfig
+from icub_jump_env.control.jump import RESIDUAL_TIME
 from icub_jump_env.control.phases import Phase
 from icub_jump_env.evaluation.rollout import make_env
 
 SHIFT = np.array([0.4, 0.2, -0.5], np.float32)
 
 
-def after_the_launch(action, phases):
+def after_the_launch(action, phases, stand_time=0.4):
     """Observations and costs of an episode whose launch is the baseline's."""
-    env = make_env(JumpConfig(stand_time=0.4, residual_phases=phases))
+    env = make_env(JumpConfig(stand_time=stand_time, residual_phases=phases))
     env.reset(seed=0)
     observations, costs, terminated, phase = [], [], False, "launch"
     while not terminated:
@@ -71,3 +72,10 @@ def test_the_posture_follows_the_residual_to_the_shift_of_the_com():
         coms.append(kinematics.com.copy())
     assert coms[1] - coms[0] == pytest.approx([0.01, 0.004, -0.01], abs=5e-4)
     env.close()
+
+
+def test_in_all_phases_the_residual_ends_with_the_landing():
+    _, costs = after_the_launch(SHIFT, "all", stand_time=1.5)
+    steps = round(RESIDUAL_TIME / 0.01)
+    assert sum(cost < 0.0 for cost in costs) == pytest.approx(steps, abs=1)
+    assert set(costs[steps + 1 :]) == {0.0}

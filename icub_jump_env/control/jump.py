@@ -22,6 +22,11 @@ FLIGHT_MOTION_TIME = 0.12
 """Duration of the minimum-jerk motion to the landing posture (s); a flight takes 0.19."""
 
 
+RESIDUAL_TIME = 0.7
+"""How long a residual acts after the launch, where it does (s): a flight takes 0.2 s, and
+after half a second on the ground most has happened."""
+
+
 def landing_posture(crouch: Array, displacement: float) -> Array:
     """Landing posture for a launch of ``displacement`` (m), (23,) rad.
 
@@ -125,6 +130,12 @@ class JumpController:
         self.phases.reset()
         self._launch.reset()
         self._flight = None
+
+    def residual_acts(self, time: float) -> bool:
+        """Whether a residual has an effect at ``time`` (s) since the start."""
+        if self._landing_shift is None:
+            return self.phases.phase is Phase.LAUNCH
+        return time < self.trajectory.duration + RESIDUAL_TIME
 
     def tick(
         self,

@@ -21,7 +21,7 @@ from icub_jump_env.evaluation.output import say, show, write_json
 from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.series import Series, heights, ranges
+from icub_jump_env.evaluation.series import Series, heights, ranges, warn_if_alike
 from icub_jump_env.evaluation.statistics import CONFIDENCE, Rate
 from icub_jump_env.evaluation.table import CM, DEG
 
@@ -152,6 +152,7 @@ def run_compare(
 ) -> None:
     """Run ``eval.py --compare``."""
     check_jobs(options.jobs)
+    warn_if_alike(options.config, progress)
     episodes = run_contenders(options, contenders, progress)
     if options.json is not None:
         write_json(options.json, report(episodes, options, contenders))
@@ -203,6 +204,13 @@ def by_command(episodes: Sequence[Episode]) -> dict[tuple[int, int], list[Episod
     return {(low, low + 1): list(group) for low, group in groups}
 
 
+def command_labels(episodes: Sequence[Episode]) -> dict[tuple[int, int], str]:
+    """What to call the groups of :func:`by_command`; a single command by itself."""
+    commands = {episode.jump_height for episode in episodes}
+    alone = f"{CM * min(commands):g} cm" if len(commands) == 1 else None
+    return {(low, high): alone or f"{low} to {high} cm" for low, high in by_command(episodes)}
+
+
 def report(
     episodes: dict[str, list[Episode]], options: EvalOptions, contenders: Sequence[Contender]
 ) -> dict[str, Any]:
@@ -249,10 +257,10 @@ def render(episodes: dict[str, list[Episode]]) -> Table:
     ):
         table.add_column(column, justify="right", no_wrap=True)
     grouped = {name: by_command(series) for name, series in episodes.items()}
-    commands = next(iter(grouped.values()))
+    labels = command_labels(next(iter(episodes.values())))
     rows = [
-        (f"{low} to {high} cm", {name: groups[low, high] for name, groups in grouped.items()})
-        for low, high in commands
+        (label, {name: groups[command] for name, groups in grouped.items()})
+        for command, label in labels.items()
     ]
     if len(rows) > 1:
         rows.append(("all", episodes))

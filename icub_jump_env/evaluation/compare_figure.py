@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from icub_jump_env.evaluation.compare import by_command
+from icub_jump_env.evaluation.compare import by_command, command_labels
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.statistics import Rate
 from icub_jump_env.evaluation.table import CM
@@ -34,7 +34,8 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
         bounds = np.array([rate.interval for rate in rates]).T * 100
         errors = np.abs(bounds - shares)
         left.bar(places, shares, 0.9 * shift, yerr=errors, color=color, label=name, capsize=2)
-        left.set_xticks(range(len(groups)), [f"{low} to {high}" for low, high in groups])
+        names = [text.removesuffix(" cm") for text in command_labels(series).values()]
+        left.set_xticks(range(len(groups)), names)
         for landed, marker in ((True, "."), (False, "x")):
             shown = [e for e in series if e.jump["landed"] == landed]
             if not shown:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 from icub_jump_env import policy
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.files import strict_json
 from icub_jump_env.policy import Policy, PolicyCard, load_policy
 from icub_jump_env.policy.card import TASK_FIELDS
 
@@ -36,8 +38,11 @@ class Contender:
 
     @property
     def identity(self) -> dict[str, str | None]:
-        """For logs and JSON."""
-        return {"name": self.name, "sha256": self.card.sha256 if self.card else None}
+        """For logs and JSON: name, and hash of the card, in which that of the numbers is."""
+        digest = None
+        if self.card is not None:
+            digest = hashlib.sha256(strict_json(self.card.as_dict()).encode()).hexdigest()
+        return {"name": self.name, "sha256": digest}
 
 
 BASELINE = Contender("baseline", policy.BASELINE)

@@ -106,10 +106,6 @@ class EvalOptions:
         ]
         if len(set(outputs)) < len(outputs):
             raise ConfigError("json", str(self.json), "another path for each output")
-        for name in _CHOSEN_BY_MODE.get(self.mode, ()):
-            value = getattr(self.config, name)
-            if value != getattr(JumpConfig(), name):
-                raise ConfigError(name, value, f"not with --{self.mode}, which varies it itself")
         if self.mode == "nominal" and self.policy is not None and self.plot is not None:
             # The figures are those of the paper: with the momentum constraint and without.
             raise ConfigError("plot", str(self.plot), "not with --policy for a single jump")
@@ -120,6 +116,10 @@ class EvalOptions:
                 where = f"--{self.mode}" if chosen else "a single jump that nothing randomises"
                 shown = str(value) if isinstance(value, Path) else value
                 raise ConfigError(option.name, shown, f"not with {where}")
+        for name in _CHOSEN_BY_MODE.get(self.mode, ()):
+            value = getattr(self.config, name)
+            if value != getattr(JumpConfig(), name):
+                raise ConfigError(name, value, f"not with --{self.mode}, which varies it itself")
 
     @property
     def mode(self) -> str:

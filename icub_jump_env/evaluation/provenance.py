@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import hashlib
 import platform
 import sys
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import icub_jump_env
@@ -16,7 +19,24 @@ _PACKAGES = ("daqp", "gymnasium", "icub-models", "mujoco", "numpy", "osqp", "pin
 
 def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
     """Versions, configuration and seed of a result."""
-    return {"versions": versions(), "config": dataclasses.asdict(config), "seed": seed}
+    return {
+        "versions": versions(),
+        "source": source(),
+        "config": dataclasses.asdict(config),
+        "seed": seed,
+    }
+
+
+@functools.cache
+def source() -> str:
+    """Hash of the code that a jump depends on: the package without the evaluation."""
+    package = Path(icub_jump_env.__file__).parent
+    digest = hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        name = file.relative_to(package).as_posix()
+        if not name.startswith("evaluation/"):
+            digest.update(name.encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def versions(*more: str) -> dict[str, str]:

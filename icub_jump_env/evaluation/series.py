@@ -14,9 +14,10 @@ from icub_jump_env.evaluation.contender import BASELINE, Contender
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.output import progress_display, say
 from icub_jump_env.evaluation.parallel import Job, run_jobs
-from icub_jump_env.evaluation.provenance import provenance
+from icub_jump_env.evaluation.provenance import provenance, source
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.files import strict_json
+from icub_jump_env.simulation.sensor_models import SensorConfig
 
 
 @dataclass(frozen=True)
@@ -82,12 +83,21 @@ class Series:
                 self.seeds.start,
                 len(self.seeds),
                 self.contender.identity,
+                source(),
             ]
         )
         digest = hashlib.sha256(asked.encode()).hexdigest()[:8]
         height = heights(self.config).replace(" ", "")
         words = (self.config.controller, self.contender.name, height, ranges(self.config), digest)
         return Path("results") / f"{'-'.join(words)}.jsonl"
+
+
+def warn_if_alike(config: JumpConfig, progress: Console) -> None:
+    """Say so where nothing differs between episodes."""
+    low, high = config.jump_heights
+    drawn = config.randomization_config.varies or low < high
+    if not drawn and config.sensor_config == SensorConfig():
+        say(progress, "nothing is random here: all episodes will be alike")
 
 
 def heights(config: JumpConfig) -> str:

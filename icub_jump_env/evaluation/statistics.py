@@ -27,9 +27,8 @@ from icub_jump_env.evaluation.output import (
 from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.series import Series, heights, ranges
+from icub_jump_env.evaluation.series import Series, heights, ranges, warn_if_alike
 from icub_jump_env.evaluation.table import CM, QUANTITIES, number
-from icub_jump_env.simulation.sensor_models import SensorConfig
 
 CONFIDENCE = 0.95
 
@@ -121,10 +120,7 @@ def run_statistics(
     """Run eval.py with several episodes or a randomised world."""
     config, episodes = options.config, options.episodes or 1
     check_jobs(options.jobs)
-    low, high = config.jump_heights
-    drawn = config.randomization_config.varies or low < high
-    if not drawn and config.sensor_config == SensorConfig():
-        say(progress, "nothing is random here: all episodes will be alike")
+    warn_if_alike(config, progress)
     series = Series(config, range(options.seed, options.seed + episodes), contender)
     done = series.run(
         options.results or series.default_log(), options.resume, options.jobs, progress

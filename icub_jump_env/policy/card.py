@@ -165,4 +165,9 @@ def _explicit(config: JumpConfig) -> JumpConfig:
 def _check_config(config: Any) -> JumpConfig:
     if isinstance(config, JumpConfig):
         return config
-    return JumpConfig.from_kwargs(check_mapping("config", config))
+    checked = JumpConfig.from_kwargs(check_mapping("config", config))
+    for field in TASK_FIELDS:
+        # Else the policy would change with the default.
+        if field not in config:
+            raise ConfigError("config", sorted(config), f"a configuration with {field}")
+    return checked

@@ -107,8 +107,8 @@ def load_policy(path: str | os.PathLike[str], config: JumpConfig | None = None) 
     tensors, values = load_tensors(Path(path), MAX_POLICY_SIZE)
     try:
         card = PolicyCard.from_mapping(values)
-        if config is not None:
-            check_match(card, config)
+        # Where nothing is said of the environment, the observation at least must be its.
+        check_match(card, card.config if config is None else config)
         return LoadedPolicy(_make(card, tensors), card)
     except ConfigError as error:
         raise PolicyFileError(str(path), str(error)) from error

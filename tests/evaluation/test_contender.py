@@ -1,7 +1,6 @@
 """``eval.py --policy``: who jumps, in which environment, and what is refused."""
 
 import contextlib
-import hashlib
 import io
 import json
 import shlex
@@ -18,6 +17,7 @@ from icub_jump_env.evaluation import cli, video, view
 from icub_jump_env.evaluation.contender import read_contenders
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.series import Series
 from icub_jump_env.policy import load_policy
 
 QUIET = Console(file=io.StringIO())
@@ -70,8 +70,7 @@ class TestSingleJump:
         assert list(arms) == ["policy", "baseline"]
         assert arms["policy"]["jump"] == jump_of(FEEDBACK)
         assert arms["baseline"]["jump"] == jump_of(None)
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()
-        assert arms["policy"]["policy"] == {"name": "mine", "sha256": digest}
+        assert arms["policy"]["policy"] == read_contenders([str(file)])[0].identity
         assert arms["baseline"]["policy"] == {"name": "baseline", "sha256": None}
         lean = next(r for r in content["comparison"] if r["quantity"] == "rotation in flight")
         ours, theirs = (
@@ -180,7 +179,7 @@ class TestOtherModes:
         )  # fmt: skip
         assert code == 0
         assert "velocity controller, mine, randomization full" in out
-        identity = {"name": "mine", "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
+        identity = read_contenders([str(file)])[0].identity
         assert json.loads((tmp_path / "r.json").read_text())["policy"] == identity
         log = tmp_path / "log.jsonl"
         header = json.loads(log.read_text().splitlines()[0])
@@ -327,3 +326,21 @@ class TestNames:
         file = save_constant(tmp_path / "mine.safetensors", 0, 0, 0)
         with pytest.raises(ConfigError, match="different names"):
             read_contenders([str(file), str(file.with_suffix(".json"))])
+
+    def test_identity_is_that_of_card_and_numbers(self, tmp_path):
+        file = save_constant(tmp_path / "mine.safetensors", 0.5, 0, 0)
+        before = read_contenders([str(file)])[0].identity
+        assert before == read_contenders([str(file)])[0].identity
+        card = json.loads(file.with_suffix(".json").read_text())
+        file.with_suffix(".json").write_text(json.dumps(card | {"action_scale": 0.1}))
+        after = read_contenders([str(file)])[0].identity
+        assert after["name"] == before["name"]
+        assert after["sha256"] != before["sha256"]
+
+
+def test_the_default_log_is_another_one_after_the_code_has_changed(monkeypatch):
+    series = Series(JumpConfig(), range(3))
+    before = series.default_log()
+    assert before == series.default_log()
+    monkeypatch.setattr("icub_jump_env.evaluation.series.source", lambda: "of tomorrow")
+    assert series.default_log() != before

@@ -244,3 +244,11 @@ def test_the_layout_must_match_by_name():
         ("observation.gyro.y", 3.0, 2.0),
         ("observation.wind", 1.0, None),
     ]
+
+
+@pytest.mark.parametrize("field", TASK_FIELDS)
+def test_a_card_says_every_field_that_the_policy_depends_on(field):
+    content = make_card().as_dict()
+    del content["config"][field]
+    with pytest.raises(ConfigError, match=f"a configuration with {field}"):
+        PolicyCard.from_mapping(content)
