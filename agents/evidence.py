@@ -23,10 +23,12 @@ from agents.arms import best_constant, open_loop
 from agents.curves import learning_curves
 from agents.options import OPTIONS
 from agents.training import BEST, CURVE
+from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.output import say
+from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.provenance import versions
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
 
@@ -62,6 +64,9 @@ class EvidenceOptions:
 
     jobs: int = 1
     train_only: bool = False
+
+    def __post_init__(self) -> None:
+        check_count("jobs", self.jobs, 1)
 
 
 def runs() -> dict[str, tuple[str, ...]]:
@@ -132,6 +137,7 @@ def _score(card: Path) -> float:
 def remake(options: EvidenceOptions) -> None:
     """Remake everything."""
     console = Console(stderr=True)
+    check_jobs(options.jobs)
     for name, arguments in runs().items():
         _train(name, arguments, console)
     if options.train_only:

@@ -9,6 +9,10 @@ class ICubJumpError(Exception):
     """Base class of all errors raised by icub_jump_env."""
 
 
+_LONGEST = 1000
+"""Characters of a value that a message shows."""
+
+
 class InvalidValueError(ICubJumpError, ValueError):
     """A value outside its allowed range.
 
@@ -20,8 +24,11 @@ class InvalidValueError(ICubJumpError, ValueError):
 
     def __init__(self, field: str, value: Any = None, allowed: str | None = None) -> None:
         # Gymnasium's asynchronous vector environment re-raises with the message alone.
+        shown = repr(value)
+        if len(shown) > _LONGEST:
+            shown = f"{shown[:_LONGEST]}..."
         super().__init__(
-            field if allowed is None else f"{field}={value!r} is not allowed: {allowed}"
+            field if allowed is None else f"{field}={shown} is not allowed: {allowed}"
         )
         self.field = field
         self.value = value

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 from scipy.stats import binomtest, bootstrap
 
@@ -267,7 +268,9 @@ def render(episodes: dict[str, list[Episode]]) -> Table:
     for label, group in rows:
         for number, (name, series) in enumerate(group.items()):
             last = number == len(group) - 1
-            table.add_row(label if number == 0 else "", name, *_cells(series), end_section=last)
+            table.add_row(
+                label if number == 0 else "", escape(name), *_cells(series), end_section=last
+            )
     table.caption = (
         "success: landed after at least 0.7 of the command; rise and distance from the command: "
         "means of all episodes, the rest medians"

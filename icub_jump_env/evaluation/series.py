@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.contender import BASELINE, Contender
@@ -61,7 +62,7 @@ class Series:
         missing = [seed for seed in self.seeds if seed not in log.episodes]
         work = [Job(self.config, seed, self.contender.policy) for seed in missing]
         with progress_display(progress) as display:
-            name = f"jumping, {self.contender.name}"
+            name = f"jumping, {escape(self.contender.name)}"
             task = display.add_task(name, total=total, completed=total - len(missing))
             try:
                 for _, episode in run_jobs(work, jobs):

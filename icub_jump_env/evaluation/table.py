@@ -99,8 +99,10 @@ def render_table(rows: Sequence[Row], title: str, other: str) -> Table:
         )
     table.caption = (
         "paper: simulated heights and landing, commanded take-off, ballistic height of the real "
-        "robot; eq. 3d: the momentum constraint"
+        "robot"
     )
+    if "3d" in other:
+        table.caption += "; eq. 3d: the momentum constraint"
     table.caption_justify = "left"
     return table
 

@@ -208,6 +208,11 @@ class TestTable:
         assert "4 cm" in text
         assert "all'" not in text
 
+    def test_names_are_shown_as_they_are(self):
+        text = printed(render({"mine[v2]": ARMS["first"], "mine[v3]": ARMS["second"]}))
+        assert "mine[v2]" in str(text)
+        assert "mine[v3]" in str(text)
+
 
 class TestFigure:
     def test_bars_are_the_success_rates_with_their_intervals(self):

@@ -252,3 +252,10 @@ def test_a_card_says_every_field_that_the_policy_depends_on(field):
     del content["config"][field]
     with pytest.raises(ConfigError, match=f"a configuration with {field}"):
         PolicyCard.from_mapping(content)
+
+
+def test_a_message_shows_no_more_than_the_beginning_of_a_long_value():
+    with pytest.raises(ConfigError) as caught:
+        PolicyCard.from_mapping(make_card().as_dict() | {"kind": "x" * 100_000})
+    assert len(str(caught.value)) < 1200
+    assert caught.value.value == "x" * 100_000
