@@ -116,8 +116,7 @@ def _point(
         TASK, controller=options.controller, jump_height=height, com_displacement=displacement
     )
     series = Series(config, TEST_SEEDS, contender)
-    log = series.default_log()
-    episodes = series.run(log, log.exists(), options.jobs, progress)
+    episodes = series.complete(options.jobs, progress)
     return Point(height, displacement, contender, Summary.of(episodes))
 
 

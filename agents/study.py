@@ -111,8 +111,7 @@ def _summary(
 ) -> Summary:
     seeds = range(TEST_SEEDS.start, TEST_SEEDS.start + options.episodes)
     series = Series(config, seeds, contender)
-    log = series.default_log()
-    return Summary.of(series.run(log, log.exists(), options.jobs, progress))
+    return Summary.of(series.complete(options.jobs, progress))
 
 
 if __name__ == "__main__":

@@ -76,6 +76,11 @@ class Series:
         say(progress, f"wrote {log.path}")
         return [log.episodes[seed] for seed in self.seeds]
 
+    def complete(self, jobs: int, progress: Console) -> list[Episode]:
+        """All episodes; those that the default log has are not run again."""
+        log = self.default_log()
+        return self.run(log, log.exists(), jobs, progress)
+
     def default_log(self) -> Path:
         """Where the log goes: readable, and another file for another series."""
         asked = strict_json(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation import cli
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.policy import NetworkPolicy, save_policy
@@ -14,6 +15,17 @@ FEEDBACK = NetworkPolicy(
     0.3,
 )
 """A policy whose action changes from step to step."""
+
+
+def evaluate(capsys, *arguments):
+    """Exit code, stdout and stderr of eval.py with these arguments."""
+    code = 0
+    try:
+        cli.evaluate([str(argument) for argument in arguments])
+    except SystemExit as end:
+        code = end.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
 
 
 def constant(*action):

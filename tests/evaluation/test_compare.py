@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contenders import FEEDBACK, episode, save, save_constant
+from contenders import FEEDBACK, episode, evaluate, save, save_constant
 from matplotlib.colors import to_rgba
 from rich.console import Console
 from scipy.stats import binom
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation import cli, compare, series
+from icub_jump_env.evaluation import compare, series
 from icub_jump_env.evaluation.compare import (
     Difference,
     Summary,
@@ -249,17 +249,6 @@ class TestFigure:
         assert list(least.get_ydata()) == pytest.approx([2.8, 4.2])
         shown = [text.get_text() for text in right.get_legend().get_texts()]
         assert shown == ["first, fallen", "second, fallen", "command", "least for a success"]
-
-
-def evaluate(capsys, *arguments):
-    """Exit code, stdout and stderr of eval.py with these arguments."""
-    code = 0
-    try:
-        cli.evaluate([str(argument) for argument in arguments])
-    except SystemExit as end:
-        code = end.code
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 RANDOM = {"randomization": "full", "jump_height": (0.03, 0.06), "stand_time": 0.0}

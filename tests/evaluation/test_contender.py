@@ -8,12 +8,12 @@ import shutil
 
 import numpy as np
 import pytest
-from contenders import FEEDBACK, save, save_constant
+from contenders import FEEDBACK, evaluate, save, save_constant
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation import cli, video, view
+from icub_jump_env.evaluation import video, view
 from icub_jump_env.evaluation.contender import read_contenders
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
@@ -22,17 +22,6 @@ from icub_jump_env.policy import load_policy
 
 QUIET = Console(file=io.StringIO())
 SHORT = ("--stand-time", "0.1")
-
-
-def evaluate(capsys, *arguments):
-    """Exit code, stdout and stderr of eval.py with these arguments."""
-    code = 0
-    try:
-        cli.evaluate([str(argument) for argument in arguments])
-    except SystemExit as end:
-        code = end.code
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def refusal(capsys, *arguments):
@@ -344,3 +333,12 @@ def test_the_default_log_is_another_one_after_the_code_has_changed(monkeypatch):
     assert before == series.default_log()
     monkeypatch.setattr("icub_jump_env.evaluation.series.source", lambda: "of tomorrow")
     assert series.default_log() != before
+
+
+def test_a_series_is_completed_from_its_log(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    series = Series(JumpConfig(stand_time=0.0), range(2))
+    episodes = series.complete(1, QUIET)
+    assert [episode.seed for episode in episodes] == [0, 1]
+    monkeypatch.setattr("icub_jump_env.evaluation.series.run_jobs", lambda work, jobs: iter(work))
+    assert series.complete(1, QUIET) == episodes
