@@ -43,7 +43,7 @@ from icub_jump_env.policy import save_policy
 from icub_jump_env.policy.fields import check_command
 
 CURVE = "curve.json"
-"""Its evaluations and all its seeds."""
+"""Its evaluations, the minutes each took with the steps before it, and all its seeds."""
 BEST = "best.safetensors"
 """The policy with the largest mean reward in an evaluation."""
 LAST = "last.safetensors"
@@ -183,6 +183,8 @@ class _Run(BaseCallback):
         self._updates = 0
         self._number = 0
         self._curve: list[dict[str, Any]] = []
+        self._minutes: list[float | None] = []
+        self._since = time.monotonic()
         self._seeds: list[list[int]] = []
         self._episodes: list[dict[str, Any]] = []
         self._resumed = False
@@ -191,6 +193,7 @@ class _Run(BaseCallback):
         """Take up what a checkpoint noted."""
         self._number, self._resumed = number, True
         self._updates, self._curve = progress["updates"], progress["curve"]
+        self._minutes = _read_minutes(self._options.folder / CURVE, len(self._curve))
         seed, jobs = self._options.seed, self._options.jobs
         self._seeds = [segment_seeds(seed, earlier, jobs) for earlier in range(1, number)]
 
@@ -269,6 +272,9 @@ class _Run(BaseCallback):
             seeds = EVALUATION_SEEDS[start : start + self._options.jobs]
             episodes += itertools.chain(*self._env.env_method("evaluate", policy, seeds))
         self._curve.append(_point(self.model.num_timesteps, episodes))
+        now = time.monotonic()
+        self._minutes.append(round((now - self._since) / 60, 3))
+        self._since = now
         newest = self._curve[-1]
         for name in ("score", "success", "landed", "rise", "rotation"):
             self.logger.record(f"evaluation/{name}", newest[name])
@@ -280,6 +286,7 @@ class _Run(BaseCallback):
             self._options.folder / CURVE,
             {
                 "evaluations": self._curve,
+                "minutes": self._minutes,
                 "seed": self._options.seed,
                 "episode_seeds": self._seeds,
                 "evaluation_seeds": [EVALUATION_SEEDS.start, EVALUATION_SEEDS.stop],
@@ -301,6 +308,15 @@ class _Run(BaseCallback):
             seed=self._options.seed,
             results={"evaluation": self._curve[-1]},
         )
+
+
+def _read_minutes(file: Path, count: int) -> list[float | None]:
+    """What the first evaluations took; unknown if the file is gone, for it is a mere report."""
+    try:
+        minutes = json.loads(file.read_text())["minutes"]
+        return [float(value) for value in minutes[:count]]
+    except (OSError, ValueError, TypeError, KeyError):
+        return [None] * count
 
 
 def _point(timesteps: int, episodes: Sequence[Episode]) -> dict[str, Any]:
