@@ -23,10 +23,10 @@ from agents.options import TASK
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
-from icub_jump_env.evaluation.compare import Summary
 from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.output import say, show
 from icub_jump_env.evaluation.series import Series
+from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.evaluation.table import CM
 
 HEIGHTS = (0.05, 0.06, 0.07, 0.08)
@@ -99,7 +99,7 @@ def frontier(options: FrontierOptions) -> None:
             f"{CM * point.displacement:g}",
             f"{100 * summary.landed.share:.0f}",
             f"{100 * summary.success.share:.0f}",
-            f"{CM * summary.rise:.2f}",
+            f"{CM * summary.mean_rise:.2f}",
             end_section=last,
         )
     show(console, table)
@@ -128,7 +128,7 @@ def frontier_figure(points: Sequence[Point]) -> Figure:
         shown = [p for p in points if p.contender.is_baseline == (name == "baseline")]
         axis.plot(
             [100 * p.summary.landed.share for p in shown],
-            [CM * p.summary.rise for p in shown],
+            [CM * p.summary.mean_rise for p in shown],
             "o",
             color=color,
             label=name,
@@ -136,7 +136,7 @@ def frontier_figure(points: Sequence[Point]) -> Figure:
         for p in shown:
             axis.annotate(
                 f"{CM * p.jump_height:g}/{CM * p.displacement:g}",
-                (100 * p.summary.landed.share, CM * p.summary.rise),
+                (100 * p.summary.landed.share, CM * p.summary.mean_rise),
                 textcoords="offset points",
                 xytext=(4, 3),
                 fontsize=7,

@@ -30,10 +30,11 @@ from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
-from icub_jump_env.evaluation.compare import Summary, bootstrap_interval
 from icub_jump_env.evaluation.contender import BASELINE, Contender, as_trained, read_contenders
+from icub_jump_env.evaluation.difference import bootstrap_interval
 from icub_jump_env.evaluation.output import show
 from icub_jump_env.evaluation.series import Series
+from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.evaluation.table import CM
 
 RUNS = Path("agents/pretrained/runs")
@@ -94,7 +95,7 @@ def _add(table: Table, name: str, summaries: Sequence[Summary]) -> None:
     cells = [name, str(len(summaries))]
     for values in (
         np.array([100 * s.success.share for s in summaries]),
-        np.array([CM * s.rise for s in summaries]),
+        np.array([CM * s.mean_rise for s in summaries]),
     ):
         decimals = 1 if values.mean() > 10 else 2
         cells.append(f"{trim_mean(values, 0.25):.{decimals}f}")

@@ -34,10 +34,10 @@ from agents.ppo import export, freeze_policy, make_model, set_noise
 from agents.run_folder import lock_run
 from agents.workers import JumpVecEnv
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation.compare import Summary, by_command
 from icub_jump_env.evaluation.output import progress_display, say, write_json
 from icub_jump_env.evaluation.provenance import command, versions
 from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.summary import Summary, by_command, command_range
 from icub_jump_env.evaluation.table import CM, DEG
 from icub_jump_env.policy import save_policy
 from icub_jump_env.policy.fields import check_command
@@ -241,11 +241,11 @@ class _Run(BaseCallback):
     def _log_episodes(self) -> None:
         record = self.logger.record
         infos, self._episodes = self._episodes, []
-        success: dict[int, list[bool]] = {}
+        success: dict[tuple[int, int], list[bool]] = {}
         for info in infos:
-            success.setdefault(int(CM * info["jump_height"]), []).append(info["is_success"])
-        for low, successes in sorted(success.items()):
-            record(f"rollout/success_{low}_to_{low + 1}_cm", np.mean(successes))
+            success.setdefault(command_range(info["jump_height"]), []).append(info["is_success"])
+        for (low, high), successes in success.items():
+            record(f"rollout/success_{low}_to_{high}_cm", np.mean(successes))
         jumps = [info["jump"] for info in infos]
         record("rollout/success", np.mean([info["is_success"] for info in infos]))
         record("rollout/landed", np.mean([jump["landed"] for jump in jumps]))
@@ -328,8 +328,8 @@ def _point(timesteps: int, episodes: Sequence[Episode]) -> dict[str, Any]:
         "score": float(np.mean([episode.reward for episode in episodes])),
         "success": summary.success.share,
         "landed": summary.landed.share,
-        "rise": summary.rise,
-        "rotation": None if math.isnan(summary.rotation) else summary.rotation,
+        "rise": summary.mean_rise,
+        "rotation": None if math.isnan(summary.median_rotation) else summary.median_rotation,
         "success_by_command": {
             f"{low} to {high} cm": Summary.of(group).success.share
             for (low, high), group in by_command(episodes).items()

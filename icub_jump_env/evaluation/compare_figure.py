@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from icub_jump_env.evaluation.compare import by_command, command_labels
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.statistics import Rate
+from icub_jump_env.evaluation.summary import Summary, by_command, command_labels
 from icub_jump_env.evaluation.table import CM
 from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
 
@@ -28,7 +27,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
     for number, (name, series) in enumerate(episodes.items()):
         color = _COLORS[number % len(_COLORS)]
         groups = by_command(series)
-        rates = [Rate(sum(e.is_success for e in g), len(g)) for g in groups.values()]
+        rates = [Summary.of(group).success for group in groups.values()]
         places = np.arange(len(groups)) + (number - (len(episodes) - 1) / 2) * shift
         shares = np.array([100 * rate.share for rate in rates])
         bounds = np.array([rate.interval for rate in rates]).T * 100

@@ -9,8 +9,8 @@ from typing import Any
 
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.failures import Failure
-from icub_jump_env.evaluation.output import strict_json, write_file
 from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.files import strict_json, write_file
 from icub_jump_env.metrics.jump import UNDEFINED, JumpMetrics
 
 

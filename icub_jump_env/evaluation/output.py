@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.files import strict_json as strict_json
-from icub_jump_env.files import write_file as write_file
+from icub_jump_env.files import strict_json, write_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def progress_display(console: Console) -> Progress:
@@ -55,6 +57,13 @@ def check_writable(field: str, path: Path, folder: bool = False) -> None:
         existing = path.parent
     if not existing.is_dir() or not os.access(existing, os.W_OK):
         raise ConfigError(field, str(path), "a path in an existing, writable folder")
+
+
+def save_figure(folder: Path, name: str, figure: Figure) -> Path:
+    """Write a figure into a folder, which is made if need be; returns the file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    figure.savefig(folder / name)
+    return folder / name
 
 
 def write_json(path: Path, content: Any) -> None:

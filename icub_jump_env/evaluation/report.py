@@ -28,12 +28,13 @@ from icub_jump_env.evaluation.figures import (
     robot_figure,
 )
 from icub_jump_env.evaluation.nominal import Arm, run_nominal
-from icub_jump_env.evaluation.output import check_writable, progress_display, write_file
+from icub_jump_env.evaluation.output import check_writable, progress_display
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Frame, make_env, run_episode, traced
 from icub_jump_env.evaluation.snapshots import Shot, take_snapshots
 from icub_jump_env.evaluation.table import Row, comparison_rows, number, verdict
 from icub_jump_env.evaluation.video import SLOW_MOTION, check_video, record_video
+from icub_jump_env.files import write_file
 
 PAGE = "index.html"
 

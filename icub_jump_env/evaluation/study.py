@@ -18,11 +18,11 @@ from rich.table import Table
 
 from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
-from icub_jump_env.evaluation.output import say, show, write_json
+from icub_jump_env.evaluation.output import save_figure, say, show, write_json
 from icub_jump_env.evaluation.parallel import Job, run_all
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.statistics import Statistics
+from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.evaluation.table import DEG
 from icub_jump_env.simulation.actuators.config import ACTUATORS
 from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
@@ -122,7 +122,7 @@ class CaseResult:
     """Outcome of a case by controller."""
 
     case: Case
-    statistics: dict[ControllerName, Statistics]
+    summaries: dict[ControllerName, Summary]
 
 
 def run_study(options: EvalOptions, console: Console, progress: Console) -> None:
@@ -135,9 +135,7 @@ def run_study(options: EvalOptions, console: Console, progress: Console) -> None
     if options.plot is not None:
         from icub_jump_env.evaluation.study_figure import realism_figure
 
-        options.plot.mkdir(parents=True, exist_ok=True)
-        file = options.plot / "realism.png"
-        realism_figure(results).savefig(file)
+        file = save_figure(options.plot, "realism.png", realism_figure(results))
         wrote.append(file)
     show(console, render(results, options))
     for path in wrote:
@@ -160,7 +158,7 @@ def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
     for owner, episode in zip(owners, run_all(work, options.jobs, progress), strict=True):
         episodes[owner].append(episode)
     return [
-        CaseResult(case, {c: Statistics.of(episodes[index, c]) for c in CONTROLLERS})
+        CaseResult(case, {c: Summary.of(episodes[index, c]) for c in CONTROLLERS})
         for index, case in enumerate(all_cases)
     ]
 
@@ -190,7 +188,7 @@ def render(results: Sequence[CaseResult], options: EvalOptions) -> Table:
             group = result.case.group
             table.add_section()
             table.add_row(f"[bold]{group}[/bold]")
-        cells = [cell for c in CONTROLLERS for cell in _cells(result.statistics[c])]
+        cells = [cell for c in CONTROLLERS for cell in _cells(result.summaries[c])]
         table.add_row(f"  {result.case.label}", *cells)
     table.caption = (
         "vel., tor.: velocity and torque controller; rise of the CoM in cm and rotation in "
@@ -200,10 +198,10 @@ def render(results: Sequence[CaseResult], options: EvalOptions) -> Table:
     return table
 
 
-def _cells(statistics: Statistics) -> tuple[str, str, str]:
-    rise = statistics.percentiles["flight_height"][1]
-    rotation = statistics.percentiles["flight_rotation"][1]
-    return f"{100 * rise:.2f}", f"{DEG * rotation:.1f}", f"{100 * statistics.landed.share:.0f}"
+def _cells(summary: Summary) -> tuple[str, str, str]:
+    rise = summary.median("flight_height")
+    rotation = summary.median("flight_rotation")
+    return f"{100 * rise:.2f}", f"{DEG * rotation:.1f}", f"{100 * summary.landed.share:.0f}"
 
 
 def study_report(results: Sequence[CaseResult], options: EvalOptions) -> dict[str, Any]:
@@ -215,7 +213,7 @@ def study_report(results: Sequence[CaseResult], options: EvalOptions) -> dict[st
         "cases": [
             {
                 **dataclasses.asdict(result.case),
-                **{c: result.statistics[c].as_dict() for c in CONTROLLERS},
+                **{c: result.summaries[c].as_dict() for c in CONTROLLERS},
             }
             for result in results
         ],

@@ -61,10 +61,10 @@ def _points(
 ) -> None:
     color = _COLORS[controller]
     for x, result in enumerate(members):
-        statistics = result.statistics[controller]
-        low, middle, high = scale * np.array(statistics.percentiles[metric])
+        summary = result.summaries[controller]
+        low, middle, high = scale * np.array(summary.percentiles[metric])
         axis.plot([x + offset] * 2, [low, high], color=color, lw=1.5)
-        share = statistics.landed.share
+        share = summary.landed.share
         axis.plot(
             x + offset, middle, ls="", color=color, ms=6,
             marker="x" if share == 0.0 else "o",

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import say, show, write_json
+from icub_jump_env.evaluation.output import save_figure, say, show, write_json
 from icub_jump_env.evaluation.parallel import Job, run_all
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
@@ -57,9 +57,7 @@ def run_sweep(options: EvalOptions, console: Console, progress: Console) -> None
         write_json(options.json, sweep_report(episodes, options))
         wrote.append(options.json)
     if options.plot is not None:
-        options.plot.mkdir(parents=True, exist_ok=True)
-        file = options.plot / "sweep.png"
-        sweep_figure(episodes).savefig(file)
+        file = save_figure(options.plot, "sweep.png", sweep_figure(episodes))
         wrote.append(file)
     for controller in CONTROLLERS:
         show(console, render(episodes, controller))

@@ -62,7 +62,8 @@ def test_a_run_leaves_its_options_policies_curve_and_checkpoints(whole):
     content = curve(whole)
     points = content["evaluations"]
     assert [point["timesteps"] for point in points] == [i * rollout for i in range(4)]
-    assert len(content["minutes"]) == 4 and min(content["minutes"]) > 0
+    assert len(content["minutes"]) == 4
+    assert min(content["minutes"]) > 0
     assert np.shape(content["episode_seeds"]) == (3, 2)
     assert content["evaluation_seeds"] == [SEEDS.start, SEEDS.stop]
     # The first update was the value function's; then the policy learned, too.
@@ -183,7 +184,8 @@ def test_a_run_goes_on_from_the_checkpoint_before_a_damaged_one(
     assert said.endswith("; checkpoint-000003.safetensors is used instead")
     assert {**results(RUN), "best.json": 0} == {**results(whole), "best.json": 0}
     *gone, last = curve(RUN)["minutes"]
-    assert gone == [None] * 3 and last > 0
+    assert gone == [None] * 3
+    assert last > 0
 
 
 def test_a_finished_run_stays_as_it_is(whole, finished, monkeypatch, capsys):

@@ -4,6 +4,7 @@ import numpy as np
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation import cli
+from icub_jump_env.evaluation.failures import Failure
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.policy import NetworkPolicy, save_policy
@@ -58,3 +59,11 @@ def episode(seed, failure=None, jump_height=0.04, **jump):
         failure=failure,
         world={"friction": 0.5},
     )
+
+
+def outcomes(pattern, rise=0.04, **jump):
+    """Episodes that succeed where the pattern has a 1."""
+    return [
+        episode(seed, None if char == "1" else Failure.SLIPPED, flight_height=rise, **jump)
+        for seed, char in enumerate(pattern)
+    ]

@@ -1,7 +1,6 @@
 """Rates, percentiles, the log on disk, resuming, replaying."""
 
 import json
-import math
 import shlex
 import signal
 import subprocess
@@ -9,10 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from contenders import episode
-from scipy.stats import norm
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
@@ -23,7 +20,7 @@ from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.output import strict_json
 from icub_jump_env.evaluation.rollout import make_env, run_episode
-from icub_jump_env.evaluation.statistics import Rate, Statistics, replay_arguments
+from icub_jump_env.evaluation.statistics import replay_arguments
 from icub_jump_env.evaluation.statistics_figure import statistics_figure
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.simulation.randomization import Randomization
@@ -31,37 +28,6 @@ from icub_jump_env.simulation.randomization import Randomization
 REPOSITORY = Path(__file__).parents[2]
 
 FAST = ["--randomization", "full", "--stand-time", "0.0"]
-
-
-@pytest.mark.parametrize(("count", "total"), [(0, 10), (7, 10), (200, 200), (190, 200)])
-def test_wilson_interval_against_its_definition(count, total):
-    """The shares p with |p_observed - p| <= z sqrt(p (1 - p) / n)."""
-    low, high = Rate(count, total).interval
-    z, observed = norm.ppf(0.975), count / total
-    for bound in (low, high):
-        if 0.0 < bound < 1.0:
-            assert (observed - bound) ** 2 == pytest.approx(z**2 * bound * (1 - bound) / total)
-    assert low <= observed <= high
-
-
-class TestStatistics:
-    def test_rates_percentiles_and_failures(self):
-        heights = np.linspace(0.03, 0.05, 21)
-        episodes = [episode(seed, flight_height=h) for seed, h in enumerate(heights)]
-        episodes[3] = episode(3, Failure.TOO_LOW, flight_height=heights[3], landed=True)
-        episodes[8] = episode(8, Failure.FELL_BACKWARD, flight_height=heights[8])
-        found = Statistics.of(episodes)
-        assert (found.landed.count, found.success.count) == (20, 19)
-        assert found.percentiles["flight_height"] == pytest.approx((0.032, 0.04, 0.048))
-        assert found.mean_rise == pytest.approx(0.04)
-        assert found.failures == {Failure.TOO_LOW: (3,), Failure.FELL_BACKWARD: (8,)}
-        assert Statistics.of(episodes[::-1]) == found
-
-    def test_undefined_metrics_are_left_out(self):
-        episodes = [episode(0, flight_rotation=0.1), episode(1, Failure.NO_TAKEOFF)]
-        found = Statistics.of(episodes)
-        assert found.percentiles["flight_rotation"] == pytest.approx((0.1, 0.1, 0.1))
-        assert all(math.isnan(value) for value in found.percentiles["base_pitch_range"])
 
 
 class TestLog:
