@@ -21,7 +21,7 @@ from rich.console import Console
 
 from agents.arms import best_constant, open_loop
 from agents.curves import learning_curves
-from agents.options import OPTIONS
+from agents.options import OPTIONS, TrainOptions, read_options
 from agents.training import BEST, CURVE
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
@@ -29,7 +29,7 @@ from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.output import say
 from icub_jump_env.evaluation.parallel import check_jobs
-from icub_jump_env.evaluation.provenance import versions
+from icub_jump_env.evaluation.provenance import SOURCE, source, versions
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
 
 PRETRAINED = Path("agents/pretrained")
@@ -86,8 +86,12 @@ def _train(name: str, arguments: tuple[str, ...], console: Console) -> None:
     folder = Path("runs/evidence") / name
     words = (*arguments, "--run", str(folder))
     if (folder / OPTIONS).exists():
+        if read_options(folder / OPTIONS).as_dict() != parse(TrainOptions, arguments).as_dict():
+            raise EvidenceError(f"{folder} holds a run with other options: remove it")
         words = ("--resume", str(folder))
     _run("train.py", *words)
+    if load_policy(folder / BEST).card.versions.get(SOURCE) != source():
+        raise EvidenceError(f"{folder} holds a run of other code: remove it")
     kept = PRETRAINED / "runs"
     kept.mkdir(parents=True, exist_ok=True)
     for suffix in (".safetensors", ".json"):

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch.utils.tensorboard  # noqa: F401 (missing, it is to be missed now)
 from rich.console import Console
 from rich.progress import Progress, TaskID
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+from torch.utils.tensorboard import SummaryWriter
 
 from agents.checkpoints import (
     Checkpoint,
@@ -35,7 +35,7 @@ from agents.run_folder import lock_run
 from agents.workers import JumpVecEnv
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.output import progress_display, say, write_json
-from icub_jump_env.evaluation.provenance import command, versions
+from icub_jump_env.evaluation.provenance import SOURCE, command, source, versions
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.summary import Summary, by_command, command_range
 from icub_jump_env.evaluation.table import CM, DEG
@@ -138,14 +138,19 @@ def _learn(
     console: Console,
 ) -> None:
     model = make_model(options, env)
-    folder = str(options.folder)
-    logger = Logger(folder, [TensorBoardOutputFormat(str(options.folder / "tensorboard"))])
+    folder = str(options.folder / "tensorboard")
+    board = TensorBoardOutputFormat(folder)
+    if checkpoint is not None:
+        restore(model, checkpoint)
+        # What was logged after the checkpoint will be logged again.
+        board.writer.close()
+        board.writer = SummaryWriter(folder, purge_step=model.num_timesteps + 1)
+    logger = Logger(str(options.folder), [board])
     with contextlib.closing(logger), progress_display(console) as display:
         model.set_logger(logger)
         task = display.add_task("learning", total=options.timesteps)
         run = _Run(options, words, console, display, task)
         if checkpoint is not None:
-            restore(model, checkpoint)
             run.resume(checkpoint.number, checkpoint.progress)
             say(console, f"going on from step {model.num_timesteps} of {options.timesteps}")
         start, before = time.monotonic(), model.num_timesteps
@@ -303,7 +308,7 @@ class _Run(BaseCallback):
             self._options.folder / name,
             export(self.model, self._options, self._action_scale),
             config=self._options.env,
-            versions=versions(*_PACKAGES),
+            versions=versions(*_PACKAGES) | {SOURCE: source()},
             command=self._command,
             seed=self._options.seed,
             results={"evaluation": self._curve[-1]},

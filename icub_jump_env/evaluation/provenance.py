@@ -17,11 +17,15 @@ from icub_jump_env.config import JumpConfig
 _PACKAGES = ("daqp", "gymnasium", "icub-models", "mujoco", "numpy", "osqp", "pin", "scipy")
 
 
+SOURCE = "source"
+"""Where records keep :func:`source`."""
+
+
 def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
     """Versions, configuration and seed of a result."""
     return {
         "versions": versions(),
-        "source": source(),
+        SOURCE: source(),
         "config": dataclasses.asdict(config),
         "seed": seed,
     }

@@ -19,8 +19,8 @@ from agents.checkpoints import load_latest
 from agents.environment import acting_steps
 from agents.options import read_options
 from agents.training import MOST_CHECKPOINTS
-from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.evaluation.rollout import make_env, run_episode
+from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import load_policy
 from icub_jump_env.policy.files import MAX_CARD_SIZE
@@ -186,6 +186,9 @@ def test_a_run_goes_on_from_the_checkpoint_before_a_damaged_one(
     *gone, last = curve(RUN)["minutes"]
     assert gone == [None] * 3
     assert last > 0
+    board = EventAccumulator(str(RUN / "tensorboard")).Reload()
+    steps = [event.step for event in board.Scalars("evaluation/score")]
+    assert steps == [point["timesteps"] for point in curve(RUN)["evaluations"]]
 
 
 def test_a_finished_run_stays_as_it_is(whole, finished, monkeypatch, capsys):
