@@ -8,31 +8,36 @@ fills agents/pretrained/, draws the learning curves, and runs docs/update.py.
 
 from __future__ import annotations
 
-import json
 import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from rich.console import Console
 
-from agents.arms import best_constant, open_loop
-from agents.curves import learning_curves
+from agents.ablations import CURVES, PRETRAINED, RUNS
+from agents.learning_figure import learning_curves
 from agents.options import OPTIONS, TrainOptions, read_options
+from agents.rivals import best_constant, open_loop
+from agents.seeds import TEST
 from agents.training import BEST, CURVE
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.cli import guarded, parse
+from icub_jump_env.evaluation.contender import Contender, read_contenders
 from icub_jump_env.evaluation.output import say
 from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.provenance import SOURCE, source, versions
+from icub_jump_env.evaluation.series import Series
+from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
+from icub_jump_env.policy.saving import LoadedPolicy
 
-PRETRAINED = Path("agents/pretrained")
 IMAGES = Path("docs/images")
 HEADLINE_SEEDS = range(5)
 ABLATION_SEEDS = range(1)
@@ -69,7 +74,7 @@ class EvidenceOptions:
         check_count("jobs", self.jobs, 1)
 
 
-def runs() -> dict[str, tuple[str, ...]]:
+def trainings() -> dict[str, tuple[str, ...]]:
     """Arguments of train.py for every training, by the name of its policy."""
     named: dict[str, tuple[str, ...]] = {}
     for seed in HEADLINE_SEEDS:
@@ -81,8 +86,29 @@ def runs() -> dict[str, tuple[str, ...]]:
     return named
 
 
-def _train(name: str, arguments: tuple[str, ...], console: Console) -> None:
-    say(console, f"run {name}")
+def remake(options: EvidenceOptions) -> None:
+    """Remake everything.
+
+    Raises:
+        EvidenceError: If a command fails, or a folder holds a run that is not the one asked
+            for or was made by other code.
+    """
+    console = Console(stderr=True)
+    check_jobs(options.jobs)
+    for name, arguments in trainings().items():
+        say(console, f"run {name}")
+        _train(name, arguments)
+    if options.train_only:
+        return
+    for controller in get_args(ControllerName):
+        shipped = _ship(controller, options.jobs, console)
+        _make_rivals(controller, shipped, options.jobs, console)
+    learning_curves(RUNS).savefig(IMAGES / "learning.png")
+    _run("docs/update.py")
+
+
+def _train(name: str, arguments: tuple[str, ...]) -> None:
+    """Train or go on, and keep the best policy and the learning curve."""
     folder = Path("runs/evidence") / name
     words = (*arguments, "--run", str(folder))
     if (folder / OPTIONS).exists():
@@ -90,13 +116,13 @@ def _train(name: str, arguments: tuple[str, ...], console: Console) -> None:
             raise EvidenceError(f"{folder} holds a run with other options: remove it")
         words = ("--resume", str(folder))
     _run("train.py", *words)
-    if load_policy(folder / BEST).card.versions.get(SOURCE) != source():
+    best = load_policy(folder / BEST)
+    if best.card.versions.get(SOURCE) != source():
         raise EvidenceError(f"{folder} holds a run of other code: remove it")
-    kept = PRETRAINED / "runs"
-    kept.mkdir(parents=True, exist_ok=True)
+    RUNS.mkdir(parents=True, exist_ok=True)
     for suffix in (".safetensors", ".json"):
-        shutil.copy((folder / BEST).with_suffix(suffix), kept / f"{name}{suffix}")
-    shutil.copy(folder / CURVE, kept / f"{name}.curve.json")
+        shutil.copy((folder / BEST).with_suffix(suffix), RUNS / f"{name}{suffix}")
+    shutil.copy(folder / CURVE, RUNS / f"{name}{CURVES}")
 
 
 def _run(*words: str) -> None:
@@ -106,17 +132,44 @@ def _run(*words: str) -> None:
         raise EvidenceError(f"failed: python {shlex.join(words)}") from error
 
 
-def _ship(controller: ControllerName) -> None:
-    """The best of the headline runs."""
-    candidates = [PRETRAINED / "runs" / f"{controller}-seed{seed}.json" for seed in HEADLINE_SEEDS]
-    best = max(candidates, key=_score)
-    for suffix in (".safetensors", ".json"):
-        shutil.copy(best.with_suffix(suffix), PRETRAINED / f"{controller}{suffix}")
+def _ship(controller: ControllerName, jobs: int, console: Console) -> LoadedPolicy:
+    """The best of the headline runs; its card says how it does where nothing was chosen."""
+    names = [f"{controller}-seed{seed}.safetensors" for seed in HEADLINE_SEEDS]
+    contenders = read_contenders([str(RUNS / name) for name in names])
+    best = max(contenders, key=lambda contender: _selection(contender)["score"])
+    assert isinstance(best.policy, LoadedPolicy)  # it was read from a file
+    card = best.policy.card
+    summary = Summary.of(Series(card.config, TEST, best).complete(jobs, console))
+    test = {
+        "seeds": [TEST.start, TEST.stop],
+        "success": summary.success.as_dict(),
+        "landed": summary.landed.as_dict(),
+        "mean_rise": summary.mean_rise,
+    }
+    path = PRETRAINED / f"{controller}.safetensors"
+    save_policy(
+        path,
+        best.policy.policy,
+        config=card.config,
+        versions=card.versions,
+        command=card.command,
+        seed=card.seed,
+        results={"selection": _selection(best), "test": test},
+    )
+    return load_policy(path)
 
 
-def _make_rivals(controller: ControllerName, jobs: int, console: Console) -> None:
+def _selection(contender: Contender) -> Mapping[str, Any]:
+    """The evaluation that made this policy the best of its run."""
+    assert contender.card is not None  # it was read from a file
+    evaluation: Mapping[str, Any] = contender.card.results["evaluation"]
+    return evaluation
+
+
+def _make_rivals(
+    controller: ControllerName, policy: LoadedPolicy, jobs: int, console: Console
+) -> None:
     """A constant shift and the shipped policy's mean action, in the same format."""
-    policy = load_policy(PRETRAINED / f"{controller}.safetensors")
     config = policy.card.config
     rivals: dict[str, NetworkPolicy | ReplayPolicy] = {
         "constant": best_constant(config, jobs, console),
@@ -127,30 +180,11 @@ def _make_rivals(controller: ControllerName, jobs: int, console: Console) -> Non
             PRETRAINED / f"{controller}-{name}.safetensors",
             rival,
             config=config,
-            versions=versions(),
+            versions=versions() | {SOURCE: source()},
             command=("python", "-m", "agents.evidence"),
             seed=None,
             results={},
         )
-
-
-def _score(card: Path) -> float:
-    return float(json.loads(card.read_text())["results"]["evaluation"]["score"])
-
-
-def remake(options: EvidenceOptions) -> None:
-    """Remake everything."""
-    console = Console(stderr=True)
-    check_jobs(options.jobs)
-    for name, arguments in runs().items():
-        _train(name, arguments, console)
-    if options.train_only:
-        return
-    for controller in get_args(ControllerName):
-        _ship(controller)
-        _make_rivals(controller, options.jobs, console)
-    learning_curves(PRETRAINED / "runs").savefig(IMAGES / "learning.png")
-    _run("docs/update.py")
 
 
 if __name__ == "__main__":

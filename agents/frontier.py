@@ -1,9 +1,10 @@
-"""The strongest baselines beside the shipped policies: how high, and how often it lands.
+"""The strongest baselines against the shipped policies: how high, and how often it lands.
 
     python -m agents.frontier --controller velocity --jobs 2
 
 The baseline jumps with every command and displacement of a grid, the policy with the same
-commands, all on the same episodes. An interrupted run goes on where it stopped.
+commands. The baselines that come nearest to the policy are chosen there, and then meet it on
+episodes that chose nothing. An interrupted run goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -14,25 +15,35 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from agents.ablations import PRETRAINED
+from agents.frontier_figure import frontier_figure
 from agents.options import TASK
+from agents.seeds import TEST, TUNING
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
-from icub_jump_env.evaluation.output import say, show
+from icub_jump_env.evaluation.difference import Difference
+from icub_jump_env.evaluation.output import check_writable, say, show
+from icub_jump_env.evaluation.parallel import check_jobs
+from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.series import Series
 from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.evaluation.table import CM
 
-HEIGHTS = (0.05, 0.06, 0.07, 0.08)
+COMMANDS = (0.05, 0.06, 0.07, 0.08)
 DISPLACEMENTS = (0.08, 0.09, 0.10, 0.11)
-TEST_SEEDS = range(3000, 3100)
-"""Neither trained on nor chosen by."""
+
+POLICY_COMMAND = 0.06
+"""The policy's where it meets the chosen baselines."""
+
+_GRID_SEEDS = TUNING[:100]
+_SLACK = 0.02
+"""Success by which a baseline may be behind the policy on the grid, where episodes are few."""
 
 
 @dataclass(frozen=True)
@@ -55,43 +66,91 @@ class FrontierOptions:
 
 @dataclass(frozen=True)
 class Point:
-    """One command and displacement.
+    """A contender with one command and displacement.
 
     Attributes:
+        contender: What acts.
         jump_height: Commanded height (m).
         displacement: Rise of the CoM in the launching phase (m).
-        contender: What acted.
-        summary: What its episodes say.
+        summary: What its episodes of the grid say.
     """
 
+    contender: Contender
     jump_height: float
     displacement: float
-    contender: Contender
     summary: Summary
 
+    def __str__(self) -> str:
+        return f"{CM * self.jump_height:g} cm after {CM * self.displacement:g} cm"
 
-def frontier(options: FrontierOptions) -> None:
-    """Run the grid and print the table."""
+
+def run_frontier(options: FrontierOptions) -> None:
+    """Run the grid, choose, and let the chosen ones meet the policy."""
     console, progress = Console(), Console(stderr=True)
-    (policy,) = read_contenders([f"agents/pretrained/{options.controller}.safetensors"])
+    check_jobs(options.jobs)
+    if options.plot is not None:
+        check_writable("plot", options.plot)
+    (policy,) = read_contenders([str(PRETRAINED / f"{options.controller}.safetensors")])
     assert policy.card is not None  # it was read from a file
-    trained = policy.card.config.com_displacement or max(DISPLACEMENTS)
-    cells = [(BASELINE, d) for d in DISPLACEMENTS] + [(policy, trained)]
+    own = policy.card.config.com_displacement or max(DISPLACEMENTS)
+    cells = [*((BASELINE, displacement) for displacement in DISPLACEMENTS), (policy, own)]
     points = [
-        _point(options, height, displacement, contender, progress)
-        for height in HEIGHTS
+        _point(options, contender, command, displacement, progress)
+        for command in COMMANDS
         for contender, displacement in cells
     ]
     if options.plot is not None:
         frontier_figure(points).savefig(options.plot)
         say(progress, f"wrote {options.plot}")
+    show(console, render(points))
+    ours = next(p for p in points if p.contender is policy and p.jump_height == POLICY_COMMAND)
+
+    def meet(point: Point) -> list[Episode]:
+        return _episodes(
+            options, point.contender, point.jump_height, point.displacement, TEST, progress
+        )
+
+    jumped = meet(ours)
+    say(console, f"seeds {TEST[0]} to {TEST[-1]}; policy, {ours}: {_words(jumped)}")
+    for role, rival in strongest([p for p in points if p.contender is BASELINE], ours).items():
+        theirs = meet(rival)
+        say(console, f"{role}, {rival}: {_words(theirs)}")
+        say(console, f"  policy against it: {Difference.of(jumped, theirs)}")
+
+
+def strongest(baselines: Sequence[Point], policy: Point) -> dict[str, Point]:
+    """The baselines that come nearest to a policy, by what they are good at.
+
+    The highest of those that succeed as often, and the most reliable of those that rise as
+    high; where there is none, the most reliable, and the highest, of all.
+    """
+
+    def success(point: Point) -> tuple[float, float]:
+        return point.summary.success.share, point.summary.mean_rise
+
+    def rise(point: Point) -> tuple[float, float]:
+        return success(point)[::-1]
+
+    sure = [p for p in baselines if success(p)[0] >= success(policy)[0] - _SLACK]
+    high = [p for p in baselines if rise(p)[0] >= rise(policy)[0]]
+    return {
+        "as reliable a baseline" if sure else "most reliable baseline": (
+            max(sure, key=rise) if sure else max(baselines, key=success)
+        ),
+        "as high a baseline" if high else "highest baseline": (
+            max(high, key=success) if high else max(baselines, key=rise)
+        ),
+    }
+
+
+def render(points: Sequence[Point]) -> Table:
+    """The table of the grid."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("command, cm", "policy", "displacement, cm"):
         table.add_column(column)
     for column in ("landed, %", "success, %", "rise, cm"):
         table.add_column(column, justify="right")
-    for point in points:
-        last = point is points[-1] or point.contender is policy
+    for point, following in zip(points, [*points[1:], None], strict=True):
         summary = point.summary
         table.add_row(
             f"{CM * point.jump_height:g}",
@@ -100,54 +159,42 @@ def frontier(options: FrontierOptions) -> None:
             f"{100 * summary.landed.share:.0f}",
             f"{100 * summary.success.share:.0f}",
             f"{CM * summary.mean_rise:.2f}",
-            end_section=last,
+            end_section=following is None or following.jump_height != point.jump_height,
         )
-    show(console, table)
+    table.caption = f"seeds {_GRID_SEEDS[0]} to {_GRID_SEEDS[-1]}"
+    table.caption_justify = "left"
+    return table
+
+
+def _episodes(
+    options: FrontierOptions,
+    contender: Contender,
+    command: float,
+    displacement: float,
+    seeds: range,
+    progress: Console,
+) -> list[Episode]:
+    config = dataclasses.replace(
+        TASK, controller=options.controller, jump_height=command, com_displacement=displacement
+    )
+    return Series(config, seeds, contender).complete(options.jobs, progress)
 
 
 def _point(
     options: FrontierOptions,
-    height: float,
-    displacement: float,
     contender: Contender,
+    command: float,
+    displacement: float,
     progress: Console,
 ) -> Point:
-    config = dataclasses.replace(
-        TASK, controller=options.controller, jump_height=height, com_displacement=displacement
-    )
-    series = Series(config, TEST_SEEDS, contender)
-    episodes = series.complete(options.jobs, progress)
-    return Point(height, displacement, contender, Summary.of(episodes))
+    episodes = _episodes(options, contender, command, displacement, _GRID_SEEDS, progress)
+    return Point(contender, command, displacement, Summary.of(episodes))
 
 
-def frontier_figure(points: Sequence[Point]) -> Figure:
-    """Mean rise over the share that lands; labels name command and displacement (cm)."""
-    figure = Figure(figsize=(6.5, 4.2), dpi=120, layout="constrained")
-    axis = figure.subplots()
-    for name, color in (("baseline", "0.45"), ("policy", "tab:blue")):
-        shown = [p for p in points if p.contender.is_baseline == (name == "baseline")]
-        axis.plot(
-            [100 * p.summary.landed.share for p in shown],
-            [CM * p.summary.mean_rise for p in shown],
-            "o",
-            color=color,
-            label=name,
-        )
-        for p in shown:
-            axis.annotate(
-                f"{CM * p.jump_height:g}/{CM * p.displacement:g}",
-                (100 * p.summary.landed.share, CM * p.summary.mean_rise),
-                textcoords="offset points",
-                xytext=(4, 3),
-                fontsize=7,
-                color=color,
-            )
-    axis.set(xlabel="landed (%)", ylabel="mean CoM rise (cm)")
-    axis.set_title("command / displacement (cm)", fontsize=9)
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.legend(frameon=False)
-    return figure
+def _words(episodes: Sequence[Episode]) -> str:
+    summary = Summary.of(episodes)
+    return f"success {summary.success}, rise {CM * summary.mean_rise:.2f} cm"
 
 
 if __name__ == "__main__":
-    guarded(lambda: frontier(parse(FrontierOptions, sys.argv[1:])))
+    guarded(lambda: run_frontier(parse(FrontierOptions, sys.argv[1:])))

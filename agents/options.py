@@ -49,9 +49,6 @@ OPTIONS = "options.json"
 COMMAND = "command"
 """Its field that holds the words of the command that began the run."""
 
-EVALUATION_SEEDS = range(10_000, 10_064)
-"""Episodes that choose the best policy; neither trained on nor reported."""
-
 
 @dataclass(frozen=True)
 class PPOOptions:

@@ -29,9 +29,10 @@ from agents.checkpoints import (
     segment_seeds,
 )
 from agents.environment import LaunchEnv, acting_steps
-from agents.options import COMMAND, EVALUATION_SEEDS, OPTIONS, TrainOptions, read_options
+from agents.options import COMMAND, OPTIONS, TrainOptions, read_options
 from agents.ppo import export, freeze_policy, make_model, set_noise
 from agents.run_folder import lock_run
+from agents.seeds import SELECTION
 from agents.workers import JumpVecEnv
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.output import progress_display, say, write_json
@@ -273,8 +274,8 @@ class _Run(BaseCallback):
         policy = export(self.model, self._options, self._action_scale)
         episodes: list[Episode] = []
         # One episode each at a time: a worker that does not answer for long counts as hung.
-        for start in range(0, len(EVALUATION_SEEDS), self._options.jobs):
-            seeds = EVALUATION_SEEDS[start : start + self._options.jobs]
+        for start in range(0, len(SELECTION), self._options.jobs):
+            seeds = SELECTION[start : start + self._options.jobs]
             episodes += itertools.chain(*self._env.env_method("evaluate", policy, seeds))
         self._curve.append(_point(self.model.num_timesteps, episodes))
         now = time.monotonic()
@@ -294,7 +295,7 @@ class _Run(BaseCallback):
                 "minutes": self._minutes,
                 "seed": self._options.seed,
                 "episode_seeds": self._seeds,
-                "evaluation_seeds": [EVALUATION_SEEDS.start, EVALUATION_SEEDS.stop],
+                "evaluation_seeds": [SELECTION.start, SELECTION.stop],
             },
         )
         say(

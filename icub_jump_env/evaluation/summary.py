@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -9,13 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.stats import binomtest, trim_mean
 
 from icub_jump_env.evaluation.failures import Failure
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.table import CM, QUANTITIES
 
 CONFIDENCE = 0.95
+
+interquartile_mean = functools.partial(trim_mean, proportiontocut=0.25)
+"""Mean of the middle half, as reported of training seeds."""
 
 _METRICS = (*(metric for _, metric, *_ in QUANTITIES), "landing_force", "joint_work")
 

@@ -129,7 +129,7 @@ def save_or_die(folder, model, number, progress):
     save(folder, model, number, progress)
 
 save, training.save_checkpoint = training.save_checkpoint, save_or_die
-training.EVALUATION_SEEDS = {SEEDS!r}
+training.SELECTION = {SEEDS!r}
 sys.argv[0] = "train.py"
 run(sys.argv[1:])
 """

@@ -43,7 +43,7 @@ UNUSUAL = TrainOptions(
 
 def train(patch, *arguments):
     """Exit code of train.py with these arguments, but few episodes in an evaluation."""
-    patch.setattr(training, "EVALUATION_SEEDS", SEEDS)
+    patch.setattr(training, "SELECTION", SEEDS)
     patch.setattr("sys.argv", ["train.py", *arguments])
     try:
         cli.run([*arguments])

@@ -11,20 +11,15 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from agents.environment import acting_steps
+from agents.seeds import TUNING
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.output import progress_display
 from icub_jump_env.evaluation.parallel import Job, run_all
 from icub_jump_env.evaluation.rollout import make_env, run_episode
 from icub_jump_env.policy import NetworkPolicy, Policy, ReplayPolicy
 
-TUNING_SEEDS = range(60)
-"""Episodes that choose constants; as those of a mean action, neither trained on nor reported."""
-
-AVERAGING_SEEDS = range(200)
-"""Episodes of a mean action."""
-
 FORWARD = tuple(np.round(np.arange(0.0, 0.81, 0.1), 3))
-VERTICAL = (-0.5, 0.0, 0.5)
+VERTICAL = (-1.0, -0.5, 0.0, 0.5)
 """Constant actions that are tried."""
 
 _COMMANDS = 9
@@ -39,7 +34,7 @@ def constant_shift(forward: float, vertical: float) -> NetworkPolicy:
 
 
 def best_constant(
-    config: JumpConfig, jobs: int, console: Console, seeds: Sequence[int] = TUNING_SEEDS
+    config: JumpConfig, jobs: int, console: Console, seeds: Sequence[int] = TUNING[:60]
 ) -> NetworkPolicy:
     """The constant shift with the largest mean reward.
 
@@ -57,7 +52,7 @@ def best_constant(
 
 
 def open_loop(
-    policy: Policy, config: JumpConfig, console: Console, seeds: Sequence[int] = AVERAGING_SEEDS
+    policy: Policy, config: JumpConfig, console: Console, seeds: Sequence[int] = TUNING
 ) -> ReplayPolicy:
     """A policy's mean action by command and time, to be replayed whatever happens.
 

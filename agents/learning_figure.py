@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.stats import trim_mean
 
+from icub_jump_env.evaluation.summary import interquartile_mean
 from icub_jump_env.evaluation.table import CM
 
 _NAME = re.compile(r"(?P<group>velocity|torque)-seed(?P<seed>\d+)\.curve\.json")
@@ -21,7 +21,7 @@ def learning_curves(folder: Path) -> Figure:
     """Each seed's evaluations as a thin line, their interquartile mean as a thick one.
 
     Args:
-        folder: Holds the ``*-seed*.curve.json`` of the runs.
+        folder: Holds the curves of the runs.
     """
     curves = defaultdict(list)
     for file in sorted(folder.glob("*.curve.json")):
@@ -35,10 +35,11 @@ def learning_curves(folder: Path) -> Figure:
     ):
         for group, runs in curves.items():
             color = _COLORS[group]
-            steps = np.array([point["timesteps"] for point in runs[0]]) / 1000
-            values = scale * np.array([[point[name] for point in run] for run in runs])
+            common = min(map(len, runs))
+            steps = np.array([point["timesteps"] for point in runs[0][:common]]) / 1000
+            values = scale * np.array([[point[name] for point in run[:common]] for run in runs])
             axis.plot(steps, values.T, color=color, lw=0.6, alpha=0.5)
-            mean = trim_mean(values, 0.25, axis=0)
+            mean = interquartile_mean(values, axis=0)
             axis.plot(steps, mean, color=color, lw=2.0, label=f"{group}, {len(runs)} seeds")
         axis.set(xlabel="steps (thousand)", ylabel=label)
         axis.spines[["top", "right"]].set_visible(False)

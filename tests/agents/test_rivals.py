@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents import arms
-from agents.arms import best_constant, constant_shift, open_loop
+from agents import rivals
 from agents.environment import acting_steps
 from agents.options import TASK
+from agents.rivals import best_constant, constant_shift, open_loop
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.rollout import make_env, run_episode
 from icub_jump_env.observation import entry_scales
@@ -23,9 +23,9 @@ CONSOLE = Console(quiet=True)
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    monkeypatch.setattr(arms, "FORWARD", (0.0, 0.4))
-    monkeypatch.setattr(arms, "VERTICAL", (-0.5, 0.5))
-    monkeypatch.setattr(arms, "_COMMANDS", 2)
+    monkeypatch.setattr(rivals, "FORWARD", (0.0, 0.4))
+    monkeypatch.setattr(rivals, "VERTICAL", (-0.5, 0.5))
+    monkeypatch.setattr(rivals, "_COMMANDS", 2)
 
 
 def test_a_constant_is_the_same_whatever_the_observation(rng):
@@ -46,19 +46,19 @@ def test_the_constant_with_the_largest_mean_reward_is_chosen(monkeypatch, best):
     def run_all(work, jobs, console):
         return [SimpleNamespace(reward=reward(job)) for job in work]
 
-    monkeypatch.setattr(arms, "run_all", run_all)
+    monkeypatch.setattr(rivals, "run_all", run_all)
     policy = best_constant(CONFIG, 1, CONSOLE, seeds=(11, 12))
     assert policy(np.zeros(80, np.float32)).tolist() == np.float32([best[0], 0, best[1]]).tolist()
 
 
 def test_the_better_constant_of_two_is_chosen(monkeypatch):
-    monkeypatch.setattr(arms, "VERTICAL", (0.0,))
+    monkeypatch.setattr(rivals, "VERTICAL", (0.0,))
     env = make_env(CONFIG)
     rewards = {
         forward: sum(
             run_episode(env, seed, constant_shift(forward, 0.0)).reward for seed in (3, 4)
         )
-        for forward in arms.FORWARD
+        for forward in rivals.FORWARD
     }
     assert len(set(rewards.values())) == 2
     chosen = best_constant(CONFIG, 1, CONSOLE, seeds=(3, 4))

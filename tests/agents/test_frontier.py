@@ -1,0 +1,76 @@
+"""The strongest baselines: how they are chosen, and what the command prints."""
+
+import dataclasses
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from agents import frontier
+from agents.frontier import FrontierOptions, Point, run_frontier, strongest
+from agents.options import TASK
+from agents.rivals import constant_shift
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.contender import BASELINE
+from icub_jump_env.policy import save_policy
+
+
+def point(success, rise, command=0.06):
+    summary = SimpleNamespace(success=SimpleNamespace(share=success), mean_rise=rise)
+    return Point(BASELINE, command, 0.09, summary)
+
+
+POLICY = point(0.95, 0.051)
+
+
+class TestStrongest:
+    def test_the_highest_as_reliable_and_the_most_reliable_as_high(self):
+        sure, surer = point(0.94, 0.047), point(1.0, 0.045)  # 0.94 is not told from 0.95 here
+        high, higher = point(0.8, 0.052), point(0.7, 0.055)
+        assert strongest([surer, higher, high, sure], POLICY) == {
+            "as reliable a baseline": sure, "as high a baseline": high,
+        }  # fmt: skip
+
+    def test_one_may_be_both(self):
+        better, worse = point(0.97, 0.052), point(0.96, 0.0515)
+        assert list(strongest([worse, better], POLICY).values()) == [better, better]
+
+    def test_where_none_comes_near(self):
+        low, lower, bad = point(0.9, 0.05), point(0.9, 0.049), point(0.5, 0.0505)
+        assert strongest([lower, low, bad], POLICY) == {
+            "most reliable baseline": low, "highest baseline": bad,
+        }  # fmt: skip
+
+
+@pytest.fixture
+def small(monkeypatch):
+    task = dataclasses.replace(TASK, stand_time=0.1)
+    for name, value in {
+        "TASK": task, "COMMANDS": (0.04, 0.06), "DISPLACEMENTS": (0.1,),
+        "TEST": range(3000, 3003), "_GRID_SEEDS": range(2), "PRETRAINED": Path("shipped"),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(frontier, name, value)
+    Path("shipped").mkdir()
+    save_policy(
+        "shipped/velocity.safetensors", constant_shift(0.0, 0.0), config=task, versions={},
+        command=("python", "x"), seed=None, results={},
+    )  # fmt: skip
+
+
+def test_the_command_prints_the_grid_and_the_meeting(small, capsys):
+    run_frontier(FrontierOptions(plot=Path("frontier.png")))
+    out = capsys.readouterr().out
+    rows = re.findall(r"^ (\d)  +(baseline|velocity) +(9|10) +", out, re.MULTILINE)
+    assert rows == [(c, *p) for c in "46" for p in (("baseline", "10"), ("velocity", "9"))]
+    assert re.search("^ ?seeds 0 to 1 *$", out, re.MULTILINE)
+    assert "seeds 3000 to 3002; policy, 6 cm after 9 cm: success " in out
+    assert len(re.findall(r"baseline, [46] cm after 10 cm: success .* of 3; .*, rise", out)) == 2
+    assert len(re.findall(r"^  policy against it: success .* McNemar .*, rise", out, re.M)) == 2
+    assert Path("frontier.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_that_cannot_be_written_is_refused_first(small, monkeypatch):
+    monkeypatch.setattr(frontier, "_point", None)
+    with pytest.raises(ConfigError, match="plot"):
+        run_frontier(FrontierOptions(plot=Path("nowhere/frontier.png")))
