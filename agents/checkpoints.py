@@ -127,19 +127,19 @@ def restore(model: PPO, checkpoint: Checkpoint) -> None:
     """
     parameters: dict[str, torch.Tensor] = {}
     state: dict[int, dict[str, torch.Tensor]] = defaultdict(dict)
-    for name, array in checkpoint.tensors.items():
-        owner, rest = name.split(".", 1)
-        if owner == "policy":
-            parameters[rest] = torch.tensor(array)
-        else:
-            index, key = rest.split(".")
-            state[int(index)][key] = torch.tensor(array)
-    # Adam's betas are a tuple, which JSON lacks.
-    groups = [group | {"betas": tuple(group["betas"])} for group in checkpoint.param_groups]
     try:
+        for name, array in checkpoint.tensors.items():
+            owner, rest = name.split(".", 1)
+            if owner == "policy":
+                parameters[rest] = torch.tensor(array)
+            else:
+                index, key = rest.split(".")
+                state[int(index)][key] = torch.tensor(array)
+        # Adam's betas are a tuple, which JSON lacks.
+        groups = [group | {"betas": tuple(group["betas"])} for group in checkpoint.param_groups]
         model.policy.load_state_dict(parameters)
         model.policy.optimizer.load_state_dict({"state": dict(state), "param_groups": groups})
-    except (RuntimeError, ValueError) as error:
+    except (RuntimeError, ValueError, TypeError, KeyError) as error:
         message = f"checkpoint {checkpoint.number} does not fit the model: {error}"
         raise CheckpointError(" ".join(message.split())) from error
     model.num_timesteps = checkpoint.num_timesteps

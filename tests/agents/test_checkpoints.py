@@ -1,6 +1,7 @@
 """Checkpoints: bit-exact continuation, and a way back from damaged ones."""
 
 import contextlib
+import dataclasses
 import errno
 import os
 import random
@@ -272,3 +273,18 @@ def test_progress_that_json_lacks_is_refused(run, folder):
 def test_another_architecture_is_refused(envs, folder):
     with pytest.raises(CheckpointError, match=r"^checkpoint 5 does not fit the model: .*$"):
         restore(make_model(envs, seed=3, width=9), load_latest(folder, pytest.fail))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"tensors": {"nonsense": np.zeros(1)}},
+        {"tensors": {"optimizer.first.step": np.zeros(1)}},
+        {"param_groups": [{}]},
+        {"param_groups": None},
+    ],
+)
+def test_one_made_by_hand_that_lacks_something_is_refused(envs, folder, change):
+    checkpoint = dataclasses.replace(load_latest(folder, pytest.fail), **change)
+    with pytest.raises(CheckpointError, match=r"^checkpoint 5 does not fit the model: .*$"):
+        restore(make_model(envs, seed=3), checkpoint)
