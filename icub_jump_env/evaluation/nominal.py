@@ -17,7 +17,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation.contender import BASELINE, Contender
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import progress_display, say, show, write_json
+from icub_jump_env.evaluation.output import progress_display, save_figure, say, show, write_json
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
 from icub_jump_env.evaluation.table import comparison_rows, render_table, verdict
@@ -79,7 +79,7 @@ def print_nominal(
 ) -> None:
     """Run eval.py without a mode."""
     config = options.config
-    if options.plot is not None:
+    if options.plot is not None and contender.is_baseline:
         from icub_jump_env.evaluation.figures import realistic
 
         realistic(config)  # refuses before any work what Fig. 4 cannot be drawn of
@@ -90,7 +90,8 @@ def print_nominal(
         write_json(options.json, nominal_report(arms, options.seed))
         wrote.append(options.json)
     if options.plot is not None:
-        wrote += _draw(arms, options, progress)
+        draw = _draw_paper if contender.is_baseline else _draw_policy
+        wrote += draw(arms, options, progress)
     rows = comparison_rows(config, ours, other)
     title = (
         f"{config.commanded_height * 100:g} cm jump, {config.controller} controller; "
@@ -108,7 +109,7 @@ def print_nominal(
         say(console, f"wrote {file}")
 
 
-def _draw(arms: Sequence[Arm], options: EvalOptions, progress: Console) -> list[Path]:
+def _draw_paper(arms: Sequence[Arm], options: EvalOptions, progress: Console) -> list[Path]:
     from icub_jump_env.evaluation.figures import draw_figures
     from icub_jump_env.evaluation.snapshots import snapshot_strip
 
@@ -123,6 +124,14 @@ def _draw(arms: Sequence[Arm], options: EvalOptions, progress: Console) -> list[
         files.append(options.plot / "fig5_snapshots.png")
         strip.savefig(files[-1])
     return files
+
+
+def _draw_policy(arms: Sequence[Arm], options: EvalOptions, progress: Console) -> list[Path]:
+    from icub_jump_env.evaluation.policy_figure import policy_figure
+
+    assert options.plot is not None  # else nothing is to be drawn
+    ours, other = (arm.episode for arm in arms)
+    return [save_figure(options.plot, "policy.png", policy_figure(options.config, ours, other))]
 
 
 def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:

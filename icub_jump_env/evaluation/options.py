@@ -106,9 +106,6 @@ class EvalOptions:
         ]
         if len(set(outputs)) < len(outputs):
             raise ConfigError("json", str(self.json), "another path for each output")
-        if self.mode == "nominal" and self.policy is not None and self.plot is not None:
-            # The figures are those of the paper: with the momentum constraint and without.
-            raise ConfigError("plot", str(self.plot), "not with --policy for a single jump")
         used = (*_COMMON, *_USED[self.mode], *chosen)
         for option in dataclasses.fields(self):
             value = getattr(self, option.name)

@@ -180,7 +180,6 @@ def test_flags_reach_the_configuration():
         (["--policy", "p.json", "--sweep"], ["policy", "--sweep"]),
         (["--policy", "p.json", "--study", "realism"], ["policy", "--study"]),
         (["--policy", "p.json", "--report", "r"], ["policy", "--report"]),
-        (["--policy", "p.json", "--plot", "figures"], ["plot", "figures", "--policy"]),
     ],
 )
 def test_refuses_with_one_line_that_names_the_reason(

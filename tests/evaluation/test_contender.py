@@ -13,7 +13,7 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation import video, view
+from icub_jump_env.evaluation import policy_figure, video, view
 from icub_jump_env.evaluation.contender import read_contenders
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
@@ -69,6 +69,26 @@ class TestSingleJump:
         row = next(line.split() for line in out.splitlines() if "rotation in flight" in line)
         assert (row[-3], row[-1]) == (f"{ours:.1f}", f"{theirs:.1f}")
         assert row[-3] != row[-1]
+
+    def test_the_picture_shows_where_the_reference_was_moved(self, capsys, tmp_path, monkeypatch):
+        drawn, figure = [], policy_figure.policy_figure
+        monkeypatch.setattr(
+            policy_figure, "policy_figure", lambda *arms: drawn.append(arms) or figure(*arms)
+        )
+        file = save_constant(tmp_path / "mine.safetensors", 0.5, -0.5, 0.2)
+        code, out, _ = evaluate(capsys, "--policy", file, *SHORT, "--plot", "figures")
+        assert code == 0
+        assert out.endswith("wrote figures/policy.png\n")
+        offset, height, pitch = figure(*drawn[0]).axes
+        # Nearly all of the residual scale (0.06, 0.02, 0.02 m) times the action, in cm.
+        asked = {"forward": 3.0, "left": -1.0, "up": 0.4}
+        for line, (name, target) in zip(offset.lines[:3], asked.items(), strict=True):
+            assert line.get_label() == name
+            assert line.get_ydata()[0] == 0.0
+            assert 0.5 < line.get_ydata()[-1] / target <= 1.0
+        for axis in (height, pitch):
+            ours, theirs = (np.array(line.get_ydata())[:40] for line in axis.lines[:2])
+            assert np.ptp(ours - theirs) > 0
 
     def test_the_baseline_is_jumped_without_the_constraint_if_the_policy_is(
         self, capsys, tmp_path
