@@ -31,6 +31,15 @@ def in_temporary_folder(tmp_path, monkeypatch):
 
 ZERO = np.zeros(3, dtype=np.float32)
 
+HARD = {
+    "randomization": "hard",
+    "sensors": "realistic",
+    "actuators": "realistic",
+    "command_delay": 1,
+    "stand_time": 0.1,
+}
+"""Every variation at once."""
+
 
 @pytest.fixture
 def env():
