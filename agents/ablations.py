@@ -9,14 +9,13 @@ evaluation goes on where it stopped.
 
 from __future__ import annotations
 
-import dataclasses
 import json
+import math
 import re
 import sys
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -25,26 +24,19 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from agents.options import TASK
 from agents.seeds import TEST
+from agents.shipped import CURVE_SUFFIX, RUNS, judged_config
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
-from icub_jump_env.evaluation.contender import BASELINE, Contender, as_trained, read_contenders
+from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.difference import bootstrap_interval
 from icub_jump_env.evaluation.output import show
 from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.series import Series
 from icub_jump_env.evaluation.summary import Summary, interquartile_mean
 from icub_jump_env.evaluation.table import CM
-
-PRETRAINED = Path("agents/pretrained")
-"""Shipped policies."""
-RUNS = PRETRAINED / "runs"
-"""The best policy of every training, and its learning curve."""
-CURVES = ".curve.json"
-"""End of the names of the curves."""
 
 _NAME = re.compile(r"(?P<kind>[\w-]+)-seed\d+")
 _ENOUGH = 5
@@ -84,26 +76,20 @@ def compare_trainings(options: AblationOptions) -> None:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("training", "seeds", "success, %", "interval", "rise, cm", "interval", "min"):
         table.add_column(column, justify="left" if column == "training" else "right")
-    for kind, members in kinds.items():
-        config = _config(members[0])
-        if kind in get_args(ControllerName):
+    headline = get_args(ControllerName)
+    for kind, members in sorted(kinds.items(), key=lambda item: item[0] not in headline):
+        config = judged_config(members[0])
+        if kind in headline:
             _add(table, f"{kind}, baseline", [_summary(config, BASELINE, options, progress)])
         summaries = [_summary(config, member, options, progress) for member in members]
-        _add(table, kind, summaries, float(np.mean([_minutes(m.name) for m in members])))
+        _add(table, kind, summaries, [_minutes(member.name) for member in members])
     table.caption = (
-        f"seeds {TEST[0]} to {TEST[options.episodes - 1]}; intervals cover the chance in the "
-        "training seed, not that in the episodes"
+        f"seeds {TEST[0]} to {TEST[options.episodes - 1]}; interquartile mean over the training "
+        "seeds and its bootstrap interval, which is of the training seeds alone and with five of "
+        "them rather narrow"
     )
     table.caption_justify = "left"
     show(console, table)
-
-
-def _config(contender: Contender) -> JumpConfig:
-    """The worlds and commands of the headline runs, and what this policy depends on."""
-    assert contender.card is not None  # it was read from a file
-    return dataclasses.replace(
-        as_trained(contender.card), jump_height=TASK.jump_height, randomization=TASK.randomization
-    )
 
 
 def _summary(
@@ -114,20 +100,21 @@ def _summary(
 
 
 def _minutes(name: str) -> float:
-    """What a training took; NaN if it was interrupted by more than a pause."""
-    minutes = json.loads((RUNS / f"{name}{CURVES}").read_text())["minutes"]
+    """What a training took; NaN if that is not known of a part of it."""
+    minutes = json.loads((RUNS / f"{name}{CURVE_SUFFIX}").read_text())["minutes"]
     return float(np.sum(np.array(minutes, dtype=float)))
 
 
 def _add(
-    table: Table, name: str, summaries: Sequence[Summary], minutes: float | None = None
+    table: Table, name: str, summaries: Sequence[Summary], minutes: Sequence[float] = ()
 ) -> None:
+    known = [value for value in minutes if not math.isnan(value)]
     table.add_row(
         name,
-        str(len(summaries)) if minutes is not None else "-",
+        str(len(minutes) or "-"),
         *_cells(np.array([100 * s.success.share for s in summaries]), 1),
         *_cells(np.array([CM * s.mean_rise for s in summaries]), 2),
-        f"{minutes:.0f}" if minutes is not None else "-",
+        f"{np.mean(known):.0f}" if known else "-",
     )
 
 

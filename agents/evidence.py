@@ -19,12 +19,12 @@ from typing import Any, get_args
 
 from rich.console import Console
 
-from agents.ablations import CURVES, PRETRAINED, RUNS
 from agents.learning_figure import learning_curves
 from agents.options import OPTIONS, TrainOptions, read_options
 from agents.rivals import best_constant, open_loop
 from agents.seeds import TEST
-from agents.training import BEST, CURVE
+from agents.shipped import CURVE_SUFFIX, PRETRAINED, RUNS
+from agents.training import BEST, CURVE, LAST, other_code
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.errors import ICubJumpError
@@ -40,18 +40,21 @@ from icub_jump_env.policy.saving import LoadedPolicy
 
 IMAGES = Path("docs/images")
 HEADLINE_SEEDS = range(5)
+PLAN_SEEDS = range(2)
 ABLATION_SEEDS = range(1)
 
 ABLATIONS = {
-    "plan": ("--inputs", "command"),
     "forward": ("--axes", "forward"),
     "vertical": ("--axes", "vertical"),
     "all-axes": ("--axes", "forward", "lateral", "vertical"),
     "nominal": ("--randomization", "none"),
-    "full": ("--randomization", "full"),
-    "all-phases": ("--residual-phases", "all"),
+    # Its episodes have three times as many steps.
+    "all-phases": ("--residual-phases", "all", "--timesteps", "300000"),
 }
-"""Arguments of train.py that make each ablation."""
+"""Arguments of train.py that make each ablation, of the velocity controller."""
+
+PLAN = ("--inputs", "command")
+"""Those of a policy that sees command and time alone."""
 
 
 class EvidenceError(ICubJumpError, RuntimeError):
@@ -80,6 +83,10 @@ def trainings() -> dict[str, tuple[str, ...]]:
     for seed in HEADLINE_SEEDS:
         for controller in get_args(ControllerName):
             named[f"{controller}-seed{seed}"] = ("--controller", controller, "--seed", str(seed))
+    for seed in PLAN_SEEDS:
+        for controller in get_args(ControllerName):
+            words = ("--controller", controller, *PLAN, "--seed", str(seed))
+            named[f"{controller}-plan-seed{seed}"] = words
     for name, arguments in ABLATIONS.items():
         for seed in ABLATION_SEEDS:
             named[f"velocity-{name}-seed{seed}"] = (*arguments, "--seed", str(seed))
@@ -98,6 +105,9 @@ def remake(options: EvidenceOptions) -> None:
     for name, arguments in trainings().items():
         say(console, f"run {name}")
         _train(name, arguments)
+    for file in RUNS.glob("*"):
+        if file.name.split(".")[0] not in trainings():
+            file.unlink()
     if options.train_only:
         return
     for controller in get_args(ControllerName):
@@ -114,15 +124,20 @@ def _train(name: str, arguments: tuple[str, ...]) -> None:
     if (folder / OPTIONS).exists():
         if read_options(folder / OPTIONS).as_dict() != parse(TrainOptions, arguments).as_dict():
             raise EvidenceError(f"{folder} holds a run with other options: remove it")
+        _check_code(folder, LAST)
         words = ("--resume", str(folder))
     _run("train.py", *words)
-    best = load_policy(folder / BEST)
-    if best.card.versions.get(SOURCE) != source():
-        raise EvidenceError(f"{folder} holds a run of other code: remove it")
+    _check_code(folder, BEST)
     RUNS.mkdir(parents=True, exist_ok=True)
     for suffix in (".safetensors", ".json"):
         shutil.copy((folder / BEST).with_suffix(suffix), RUNS / f"{name}{suffix}")
-    shutil.copy(folder / CURVE, RUNS / f"{name}{CURVES}")
+    shutil.copy(folder / CURVE, RUNS / f"{name}{CURVE_SUFFIX}")
+
+
+def _check_code(folder: Path, name: str) -> None:
+    """See that a policy of a run jumped with the present code."""
+    if other_code(folder / name):
+        raise EvidenceError(f"{folder} holds a run of other code: remove it")
 
 
 def _run(*words: str) -> None:

@@ -3,8 +3,10 @@
     python -m agents.frontier --controller velocity --jobs 2
 
 The baseline jumps with every command and displacement of a grid, the policy with the same
-commands. The baselines that come nearest to the policy are chosen there, and then meet it on
-episodes that chose nothing. An interrupted run goes on where it stopped.
+commands; posture and gains are as they were tuned for the package. The baselines that come
+nearest to the policy are chosen there, and then meet it on episodes that chose nothing. All are
+judged alike, whatever their command: success is a landing after a rise that is enough for the
+policy's command. An interrupted run goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -19,27 +21,30 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from agents.ablations import PRETRAINED
 from agents.frontier_figure import frontier_figure
-from agents.options import TASK
 from agents.seeds import TEST, TUNING
+from agents.shipped import PRETRAINED, judged_config
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.difference import Difference
-from icub_jump_env.evaluation.output import check_writable, say, show
+from icub_jump_env.evaluation.output import check_writable, save_figure, say, show
 from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.series import Series
 from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.evaluation.table import CM
+from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
+from icub_jump_env.reference.com_trajectory import plan_com_trajectory
+
+Episodes = Sequence[Episode]
 
 COMMANDS = (0.05, 0.06, 0.07, 0.08)
-DISPLACEMENTS = (0.08, 0.09, 0.10, 0.11)
+DISPLACEMENTS = (0.07, 0.08, 0.09, 0.10, 0.11)
 
 POLICY_COMMAND = 0.06
-"""The policy's where it meets the chosen baselines."""
+"""The policy's where it meets the chosen baselines; what is enough for it is a success."""
 
 _GRID_SEEDS = TUNING[:100]
 _SLACK = 0.02
@@ -53,7 +58,7 @@ class FrontierOptions:
     Attributes:
         controller: Controller of the launching phase.
         jobs: Processes that work in parallel.
-        plot: Draw the picture into this file.
+        plot: Draw the picture into this folder.
     """
 
     controller: ControllerName = "velocity"
@@ -89,26 +94,33 @@ def run_frontier(options: FrontierOptions) -> None:
     console, progress = Console(), Console(stderr=True)
     check_jobs(options.jobs)
     if options.plot is not None:
-        check_writable("plot", options.plot)
+        check_writable("plot", options.plot, folder=True)
     (policy,) = read_contenders([str(PRETRAINED / f"{options.controller}.safetensors")])
-    assert policy.card is not None  # it was read from a file
-    own = policy.card.config.com_displacement or max(DISPLACEMENTS)
+    config = judged_config(policy)
+    own = plan_com_trajectory(
+        POLICY_COMMAND, config.com_displacement, config.com_scaling
+    ).displacement
     cells = [*((BASELINE, displacement) for displacement in DISPLACEMENTS), (policy, own)]
+
+    def jumps(contender: Contender, command: float, displacement: float, seeds: range) -> Episodes:
+        jump = dataclasses.replace(config, jump_height=command, com_displacement=displacement)
+        episodes = Series(jump, seeds, contender).complete(options.jobs, progress)
+        return [judged(episode) for episode in episodes]
+
     points = [
-        _point(options, contender, command, displacement, progress)
+        Point(contender, command, displacement, Summary.of(episodes))
         for command in COMMANDS
         for contender, displacement in cells
+        for episodes in [jumps(contender, command, displacement, _GRID_SEEDS)]
     ]
     if options.plot is not None:
-        frontier_figure(points).savefig(options.plot)
-        say(progress, f"wrote {options.plot}")
+        file = save_figure(options.plot, "frontier.png", frontier_figure(points))
+        say(progress, f"wrote {file}")
     show(console, render(points))
     ours = next(p for p in points if p.contender is policy and p.jump_height == POLICY_COMMAND)
 
-    def meet(point: Point) -> list[Episode]:
-        return _episodes(
-            options, point.contender, point.jump_height, point.displacement, TEST, progress
-        )
+    def meet(point: Point) -> Episodes:
+        return jumps(point.contender, point.jump_height, point.displacement, TEST)
 
     jumped = meet(ours)
     say(console, f"seeds {TEST[0]} to {TEST[-1]}; policy, {ours}: {_words(jumped)}")
@@ -116,6 +128,16 @@ def run_frontier(options: FrontierOptions) -> None:
         theirs = meet(rival)
         say(console, f"{role}, {rival}: {_words(theirs)}")
         say(console, f"  policy against it: {Difference.of(jumped, theirs)}")
+
+
+def judged(episode: Episode) -> Episode:
+    """The same episode, a success if it would be one after the policy's command."""
+    enough = episode.jump["flight_height"] >= MIN_HEIGHT_RATIO * POLICY_COMMAND
+    return dataclasses.replace(
+        episode,
+        jump_height=POLICY_COMMAND,
+        is_success=bool(episode.jump["landed"]) and enough,
+    )
 
 
 def strongest(baselines: Sequence[Point], policy: Point) -> dict[str, Point]:
@@ -161,37 +183,15 @@ def render(points: Sequence[Point]) -> Table:
             f"{CM * summary.mean_rise:.2f}",
             end_section=following is None or following.jump_height != point.jump_height,
         )
-    table.caption = f"seeds {_GRID_SEEDS[0]} to {_GRID_SEEDS[-1]}"
+    table.caption = (
+        f"seeds {_GRID_SEEDS[0]} to {_GRID_SEEDS[-1]}; success: landed after at least "
+        f"{CM * MIN_HEIGHT_RATIO * POLICY_COMMAND:g} cm"
+    )
     table.caption_justify = "left"
     return table
 
 
-def _episodes(
-    options: FrontierOptions,
-    contender: Contender,
-    command: float,
-    displacement: float,
-    seeds: range,
-    progress: Console,
-) -> list[Episode]:
-    config = dataclasses.replace(
-        TASK, controller=options.controller, jump_height=command, com_displacement=displacement
-    )
-    return Series(config, seeds, contender).complete(options.jobs, progress)
-
-
-def _point(
-    options: FrontierOptions,
-    contender: Contender,
-    command: float,
-    displacement: float,
-    progress: Console,
-) -> Point:
-    episodes = _episodes(options, contender, command, displacement, _GRID_SEEDS, progress)
-    return Point(contender, command, displacement, Summary.of(episodes))
-
-
-def _words(episodes: Sequence[Episode]) -> str:
+def _words(episodes: Episodes) -> str:
     summary = Summary.of(episodes)
     return f"success {summary.success}, rise {CM * summary.mean_rise:.2f} cm"
 

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from agents.shipped import CURVE_SUFFIX
 from icub_jump_env.evaluation.summary import interquartile_mean
 from icub_jump_env.evaluation.table import CM
 
-_NAME = re.compile(r"(?P<group>velocity|torque)-seed(?P<seed>\d+)\.curve\.json")
+_NAME = re.compile(r"(?P<group>velocity|torque)-seed\d+" + re.escape(CURVE_SUFFIX))
 _COLORS = {"velocity": "tab:blue", "torque": "tab:orange"}
 
 
@@ -24,13 +25,13 @@ def learning_curves(folder: Path) -> Figure:
         folder: Holds the curves of the runs.
     """
     curves = defaultdict(list)
-    for file in sorted(folder.glob("*.curve.json")):
+    for file in sorted(folder.glob(f"*{CURVE_SUFFIX}")):
         if match := _NAME.fullmatch(file.name):
             curves[match["group"]].append(json.loads(file.read_text())["evaluations"])
     figure = Figure(figsize=(9.0, 3.5), dpi=120, layout="constrained")
     panels = figure.subplots(1, 2)
     for axis, name, scale, label in (
-        (panels[0], "success", 100.0, "success in 64 episodes (%)"),
+        (panels[0], "success", 100.0, "success (%)"),
         (panels[1], "rise", CM, "mean CoM rise (cm)"),
     ):
         for group, runs in curves.items():

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from rich.console import Console
 from rich.progress import Progress, TaskID
 from stable_baselines3 import PPO
@@ -34,17 +35,17 @@ from agents.ppo import export, freeze_policy, make_model, set_noise
 from agents.run_folder import lock_run
 from agents.seeds import SELECTION
 from agents.workers import JumpVecEnv
-from icub_jump_env.errors import ConfigError
+from icub_jump_env.errors import ConfigError, PolicyFileError
 from icub_jump_env.evaluation.output import progress_display, say, write_json
 from icub_jump_env.evaluation.provenance import SOURCE, command, source, versions
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.summary import Summary, by_command, command_range
 from icub_jump_env.evaluation.table import CM, DEG
-from icub_jump_env.policy import save_policy
+from icub_jump_env.policy import load_policy, save_policy
 from icub_jump_env.policy.fields import check_command
 
 CURVE = "curve.json"
-"""Its evaluations, the minutes each took with the steps before it, and all its seeds."""
+"""Its evaluations, the minutes each took with the steps before it, and its seeds."""
 BEST = "best.safetensors"
 """The policy with the largest mean reward in an evaluation."""
 LAST = "last.safetensors"
@@ -73,7 +74,7 @@ def train(options: TrainOptions, console: Console) -> None:
     _check_checkpoints(options)
     folder = options.folder
     with _named(folder), lock_run(folder):
-        words = _claim(options)
+        words = _claim(options, console)
         checkpoint = load_latest(folder, partial(say, console))
         if checkpoint is not None and checkpoint.num_timesteps >= options.timesteps:
             say(console, f"{folder} is finished")
@@ -104,7 +105,7 @@ def _named(folder: Path) -> Iterator[None]:
         raise OSError(error.errno, error.strerror, str(folder)) from error
 
 
-def _claim(options: TrainOptions) -> Sequence[str]:
+def _claim(options: TrainOptions, console: Console) -> Sequence[str]:
     """See that the folder holds this run or nothing.
 
     Returns:
@@ -117,11 +118,24 @@ def _claim(options: TrainOptions) -> Sequence[str]:
         words = command()
         write_json(file, {COMMAND: words, **options.as_dict()})
         return words
+    if other_code(options.folder / LAST):
+        say(
+            console,
+            f"{options.folder} was begun with other code: it will not end as it would have",
+        )
     recorded = _flags(read_options(file))
     for flag, value in _flags(options).items():
         if value != recorded[flag]:
             raise ConfigError(flag, value, f"{recorded[flag]!r}, as {file} has it")
     return check_command(json.loads(file.read_text()).get(COMMAND, command()))
+
+
+def other_code(file: Path) -> bool:
+    """Whether a run's policy jumped with other code than the present; not if it is unreadable."""
+    try:
+        return load_policy(file).card.versions.get(SOURCE) != source()
+    except PolicyFileError:
+        return False
 
 
 def _flags(options: TrainOptions) -> dict[str, Any]:
@@ -235,9 +249,7 @@ class _Run(BaseCallback):
 
     def _on_rollout_end(self) -> None:
         self._log_episodes()
-        actions = self.model.rollout_buffer.actions
-        size = self._action_scale * np.abs(np.clip(actions, -1.0, 1.0)).mean()
-        self.logger.record("rollout/residual_size", float(size))
+        self.logger.record("rollout/residual_size", self._residual_size())
         self.logger.dump(self.model.num_timesteps)
         self._updates += 1
 
@@ -258,7 +270,16 @@ class _Run(BaseCallback):
         record("rollout/rise_cm", CM * np.mean([jump["flight_height"] for jump in jumps]))
         rotations = [abs(jump["flight_rotation"]) for jump in jumps if jump["flight_time"]]
         if rotations:
-            record("rollout/rotation_deg", DEG * np.mean(rotations))
+            record("rollout/rotation_deg", DEG * np.median(rotations))
+
+    def _residual_size(self) -> float:
+        """Mean size of the policy's actions, without exploration."""
+        observations = self.model.rollout_buffer.observations
+        assert isinstance(observations, np.ndarray)  # of one Box
+        with torch.no_grad():
+            flat = torch.as_tensor(observations.reshape(-1, observations.shape[-1]))
+            actions = self.model.policy.get_distribution(flat).mode().numpy()
+        return float(self._action_scale * np.abs(np.clip(actions, -1.0, 1.0)).mean())
 
     def _checkpoint(self) -> None:
         """Evaluate and save."""
@@ -282,8 +303,11 @@ class _Run(BaseCallback):
         self._minutes.append(round((now - self._since) / 60, 3))
         self._since = now
         newest = self._curve[-1]
-        for name in ("score", "success", "landed", "rise", "rotation"):
+        for name in ("score", "success", "landed"):
             self.logger.record(f"evaluation/{name}", newest[name])
+        self.logger.record("evaluation/rise_cm", CM * newest["rise"])
+        if newest["rotation"] is not None:
+            self.logger.record("evaluation/rotation_deg", DEG * newest["rotation"])
         self.logger.dump(self.model.num_timesteps)
         self._save_policy(LAST)
         if newest["score"] >= max(point["score"] for point in self._curve):
@@ -320,7 +344,7 @@ def _read_minutes(file: Path, count: int) -> list[float | None]:
     """What the first evaluations took; unknown if the file is gone, for it is a mere report."""
     try:
         minutes = json.loads(file.read_text())["minutes"]
-        return [float(value) for value in minutes[:count]]
+        return [None if value is None else float(value) for value in minutes[:count]]
     except (OSError, ValueError, TypeError, KeyError):
         return [None] * count
 

@@ -19,7 +19,7 @@ from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.series import Series, heights, ranges, warn_if_alike
 from icub_jump_env.evaluation.summary import Summary, by_command, command_labels
-from icub_jump_env.evaluation.table import CM, DEG
+from icub_jump_env.evaluation.table import CM, DEG, number
 
 
 def run_compare(
@@ -44,10 +44,15 @@ def run_compare(
         f"{ranges(config)}, seeds {seeds[0]} to {seeds[-1]} for each",
     )
     show(console, render(episodes))
-    first, *others = episodes
-    for name in others:
-        difference = Difference.of(episodes[name], episodes[first])
-        say(console, f"{name} against {first}: {difference}")
+    for ours, theirs in _pairs(contenders):
+        difference = Difference.of(episodes[ours], episodes[theirs])
+        say(console, f"{ours} against {theirs}: {difference}")
+
+
+def _pairs(contenders: Sequence[Contender]) -> list[tuple[str, str]]:
+    """Names: all against the first, and the last against those between."""
+    first, *others = (contender.name for contender in contenders)
+    return [(name, first) for name in others] + [(others[-1], name) for name in others[:-1]]
 
 
 def run_contenders(
@@ -71,11 +76,10 @@ def report(
     episodes: dict[str, list[Episode]], options: EvalOptions, contenders: Sequence[Contender]
 ) -> dict[str, Any]:
     """Everything that was found, for ``--json``."""
-    first = next(iter(episodes))
     return {
         "mode": "compare",
         "command": command(),
-        "episodes": len(episodes[first]),
+        "episodes": options.episodes or 1,
         **provenance(options.config, options.seed),
         "contenders": {
             contender.name: {
@@ -88,12 +92,26 @@ def report(
             }
             for contender in contenders
         },
-        "differences": {
-            name: vars(Difference.of(episodes[name], episodes[first]))
-            for name in episodes
-            if name != first
-        },
+        "differences": [
+            {
+                "ours": ours,
+                "theirs": theirs,
+                "all": vars(Difference.of(episodes[ours], episodes[theirs])),
+                "by_command": _differences_by_command(episodes[ours], episodes[theirs]),
+            }
+            for ours, theirs in _pairs(contenders)
+        ],
     }
+
+
+def _differences_by_command(
+    ours: Sequence[Episode], theirs: Sequence[Episode]
+) -> list[dict[str, Any]]:
+    groups = zip(by_command(ours).items(), by_command(theirs).values(), strict=True)
+    return [
+        {"jump_height": (low / CM, high / CM), **vars(Difference.of(our_group, their_group))}
+        for ((low, high), our_group), their_group in groups
+    ]
 
 
 def render(episodes: dict[str, list[Episode]]) -> Table:
@@ -121,10 +139,10 @@ def render(episodes: dict[str, list[Episode]]) -> Table:
     if len(rows) > 1:
         rows.append(("all", episodes))
     for label, group in rows:
-        for number, (name, series) in enumerate(group.items()):
-            last = number == len(group) - 1
+        for row, (name, series) in enumerate(group.items()):
+            last = row == len(group) - 1
             table.add_row(
-                label if number == 0 else "", escape(name), *_cells(series), end_section=last
+                label if row == 0 else "", escape(name), *_cells(series), end_section=last
             )
     table.caption = (
         "success: landed after at least 0.7 of the command; rise and distance from the command: "
@@ -141,9 +159,9 @@ def _cells(episodes: Sequence[Episode]) -> list[str]:
         f"{100 * summary.success.share:.1f} %",
         f"{100 * low:.1f} to {100 * high:.1f}",
         f"{100 * summary.landed.share:.1f} %",
-        f"{CM * summary.mean_rise:.2f}",
-        f"{CM * summary.mean_height_error:.2f}",
-        f"{DEG * summary.median_rotation:.1f}",
-        f"{summary.median('landing_force'):.0f}",
-        f"{summary.median('joint_work'):.0f}",
+        number(CM * summary.mean_rise, "cm"),
+        number(CM * summary.mean_height_error, "cm"),
+        number(DEG * summary.median_rotation, "deg"),
+        number(summary.median("landing_force"), "N"),
+        number(summary.median("joint_work"), "J"),
     ]

@@ -45,7 +45,13 @@ class Difference:
 
     @classmethod
     def of(cls, ours: Sequence[Episode], theirs: Sequence[Episode]) -> Difference:
-        """The difference of two lists with the same seeds in the same order."""
+        """The difference of two lists with the same seeds in the same order.
+
+        Raises:
+            ValueError: If the seeds differ.
+        """
+        if [episode.seed for episode in ours] != [episode.seed for episode in theirs]:
+            raise ValueError("pairs of episodes have the same seeds in the same order")
         gains = np.array([o.is_success - t.is_success for o, t in zip(ours, theirs, strict=True)])
         won, lost = int((gains > 0).sum()), int((gains < 0).sum())
         rises = _heights(ours) - _heights(theirs)

@@ -21,6 +21,7 @@ from icub_jump_env.evaluation.output import progress_display, save_figure, say, 
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
 from icub_jump_env.evaluation.table import comparison_rows, render_table, verdict
+from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 
 
 @dataclass(frozen=True)
@@ -93,18 +94,22 @@ def print_nominal(
         draw = _draw_paper if contender.is_baseline else _draw_policy
         wrote += draw(arms, options, progress)
     rows = comparison_rows(config, ours, other)
-    title = (
-        f"{config.commanded_height * 100:g} cm jump, {config.controller} controller; "
-        "the paper's: 4 cm after 11 cm"
-    )
+    title = f"{config.commanded_height * 100:g} cm jump, {config.controller} controller"
+    paper = "; the paper's: 4 cm after 11 cm"
     if contender.is_baseline:
         show(
             console,
-            render_table(rows, title, f"{'no' if config.momentum_control else 'with'} eq. 3d"),
+            render_table(
+                rows, title + paper, f"{'no' if config.momentum_control else 'with'} eq. 3d"
+            ),
         )
         say(console, verdict(rows, config.momentum_control))
     else:
-        show(console, render_table(rows, title, "baseline"))
+        launch = plan_com_trajectory(
+            config.commanded_height, config.com_displacement, config.com_scaling
+        )
+        acting = f" with {contender.name}, after {launch.displacement * 100:.3g} cm"
+        show(console, render_table(rows, title + acting + paper, "baseline"))
     for file in wrote:
         say(console, f"wrote {file}")
 

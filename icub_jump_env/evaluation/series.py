@@ -15,7 +15,7 @@ from icub_jump_env.evaluation.contender import BASELINE, Contender
 from icub_jump_env.evaluation.log import EpisodeLog
 from icub_jump_env.evaluation.output import progress_display, say
 from icub_jump_env.evaluation.parallel import Job, run_jobs
-from icub_jump_env.evaluation.provenance import provenance, source
+from icub_jump_env.evaluation.provenance import provenance, source, versions
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.files import strict_json
 from icub_jump_env.simulation.sensor_models import SensorConfig
@@ -35,7 +35,14 @@ class Series:
     seeds: range
     contender: Contender = BASELINE
 
-    def run(self, path: Path, resume: bool, jobs: int, progress: Console) -> list[Episode]:
+    def run(
+        self,
+        path: Path,
+        resume: bool,
+        jobs: int,
+        progress: Console,
+        remedy: str = "add --resume to the command to finish",
+    ) -> list[Episode]:
         """Run the episodes that the log lacks.
 
         Args:
@@ -43,6 +50,7 @@ class Series:
             resume: Whether to go on with an existing log.
             jobs: Number of worker processes.
             progress: Where the progress is shown.
+            remedy: What to say of an interrupted one.
 
         Returns:
             All episodes, by seed.
@@ -70,7 +78,7 @@ class Series:
                     display.advance(task)
             except BaseException:
                 kept = f"{len(log.episodes)} of {total} episodes are in {log.path}"
-                say(progress, f"{kept}; add --resume to the command to finish")
+                say(progress, f"{kept}; {remedy}")
                 raise
         log.finish()
         say(progress, f"wrote {log.path}")
@@ -79,7 +87,7 @@ class Series:
     def complete(self, jobs: int, progress: Console) -> list[Episode]:
         """All episodes; those that the default log has are not run again."""
         log = self.default_log()
-        return self.run(log, log.exists(), jobs, progress)
+        return self.run(log, log.exists(), jobs, progress, "the same command goes on there")
 
     def default_log(self) -> Path:
         """Where the log goes: readable, and another file for another series."""
@@ -90,6 +98,7 @@ class Series:
                 len(self.seeds),
                 self.contender.identity,
                 source(),
+                versions(),
             ]
         )
         digest = hashlib.sha256(asked.encode()).hexdigest()[:8]

@@ -117,7 +117,7 @@ def verdict(rows: Sequence[Row], momentum_control: bool) -> str:
     return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
 
 
-_DECIMALS = {"cm": 2, "m/s": 3, "s": 3, "deg": 1, "steps": 0, "%": 0}
+_DECIMALS = {"cm": 2, "m/s": 3, "s": 3, "deg": 1, "N": 0, "J": 0, "steps": 0, "%": 0}
 
 
 def number(value: float | None, unit: str | None = None, signed: bool = False) -> str:

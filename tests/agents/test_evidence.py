@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiny_run import ARGUMENTS, train, written
 
-from agents import evidence, rivals
+from agents import evidence, rivals, training
 from agents.evidence import EvidenceError, EvidenceOptions, remake, trainings
 from agents.options import TrainOptions
 from icub_jump_env.evaluation.rollout import make_env, run_episode
@@ -27,7 +27,9 @@ def calls(monkeypatch):
 
     monkeypatch.setattr(evidence, "_run", run)
     monkeypatch.setattr(evidence, "HEADLINE_SEEDS", range(2))
-    monkeypatch.setattr(evidence, "ABLATIONS", {"plan": ("--inputs", "command")})
+    monkeypatch.setattr(evidence, "PLAN_SEEDS", range(1))
+    monkeypatch.setattr(evidence, "ABLATIONS", {"forward": ("--axes", "forward")})
+    monkeypatch.setattr(evidence, "ABLATION_SEEDS", range(1))
     named = trainings()
     tiny = {name: (*words, *ARGUMENTS) for name, words in named.items()}
     monkeypatch.setattr(evidence, "trainings", lambda: tiny)
@@ -48,11 +50,11 @@ def test_everything_is_made_and_nothing_twice(calls):
     remake(EvidenceOptions())
     names = [
         *(f"{c}-seed{s}" for c in ("velocity", "torque") for s in (0, 1)),
-        "velocity-plan-seed0",
+        *("velocity-plan-seed0", "torque-plan-seed0", "velocity-forward-seed0"),
     ]
     assert sorted(file.stem for file in RUNS.glob("*.safetensors")) == sorted(names)
-    assert len(list(RUNS.glob("*.curve.json"))) == 5
-    assert [words[0] for words in calls] == ["train.py"] * 5 + ["docs/update.py"]
+    assert len(list(RUNS.glob("*.curve.json"))) == 7
+    assert [words[0] for words in calls] == ["train.py"] * 7 + ["docs/update.py"]
     plan = load_policy(RUNS / "velocity-plan-seed0.safetensors").card
     assert len(plan.inputs) == len(TrainOptions(inputs="command").input_names)
     assert Path("docs/images/learning.png").exists()
@@ -70,9 +72,10 @@ def test_everything_is_made_and_nothing_twice(calls):
             card = load_policy(SHIPPED / f"{controller}-{rival}.safetensors").card
             assert card.config == shipped.card.config
     before = written(SHIPPED)
+    Path(RUNS, "velocity-old-seed0.json").touch()  # of an ablation that is no more
     remake(EvidenceOptions())
     assert written(SHIPPED) == before
-    assert [words[1] for words in calls[6:11]] == ["--resume"] * 5
+    assert [words[1] for words in calls[8:15]] == ["--resume"] * 7
 
 
 def test_runs_of_other_options_or_code_are_not_taken_for_these(calls, monkeypatch):
@@ -80,13 +83,15 @@ def test_runs_of_other_options_or_code_are_not_taken_for_these(calls, monkeypatc
     monkeypatch.setattr(evidence, "trainings", lambda: {name: words})
     remake(EvidenceOptions(train_only=True))
     assert not list(SHIPPED.glob("*.safetensors"))
+    made = len(calls)
     with monkeypatch.context() as patch:
         patch.setattr(evidence, "trainings", lambda: {name: (*words, "--ppo.epochs", "2")})
         with pytest.raises(EvidenceError, match=f"{name} holds a run with other options"):
             remake(EvidenceOptions(train_only=True))
-    monkeypatch.setattr(evidence, "source", lambda: "0" * 16)
+    monkeypatch.setattr(training, "source", lambda: "0" * 16)
     with pytest.raises(EvidenceError, match=f"{name} holds a run of other code"):
         remake(EvidenceOptions(train_only=True))
+    assert len(calls) == made  # neither went on
 
 
 def test_a_command_that_fails_ends_it_with_its_words():
@@ -96,5 +101,5 @@ def test_a_command_that_fails_ends_it_with_its_words():
 
 def test_every_kind_of_training_has_its_seeds():
     named = trainings()
-    assert len(named) == 2 * 5 + len(evidence.ABLATIONS)
+    assert len(named) == 2 * 5 + 2 * 2 + len(evidence.ABLATIONS)
     assert named["torque-seed4"] == ("--controller", "torque", "--seed", "4")

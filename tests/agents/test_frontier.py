@@ -7,12 +7,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from agents import frontier
-from agents.frontier import FrontierOptions, Point, run_frontier, strongest
+from agents import frontier, shipped
+from agents.frontier import FrontierOptions, Point, judged, run_frontier, strongest
 from agents.options import TASK
 from agents.rivals import constant_shift
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.contender import BASELINE
+from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.policy import save_policy
 
 
@@ -46,8 +47,9 @@ class TestStrongest:
 @pytest.fixture
 def small(monkeypatch):
     task = dataclasses.replace(TASK, stand_time=0.1)
+    monkeypatch.setattr(shipped, "TASK", task)
     for name, value in {
-        "TASK": task, "COMMANDS": (0.04, 0.06), "DISPLACEMENTS": (0.1,),
+        "COMMANDS": (0.04, 0.06), "DISPLACEMENTS": (0.1,),
         "TEST": range(3000, 3003), "_GRID_SEEDS": range(2), "PRETRAINED": Path("shipped"),
     }.items():  # fmt: skip
         monkeypatch.setattr(frontier, name, value)
@@ -59,18 +61,30 @@ def small(monkeypatch):
 
 
 def test_the_command_prints_the_grid_and_the_meeting(small, capsys):
-    run_frontier(FrontierOptions(plot=Path("frontier.png")))
+    run_frontier(FrontierOptions(plot=Path("pictures")))
     out = capsys.readouterr().out
     rows = re.findall(r"^ (\d)  +(baseline|velocity) +(9|10) +", out, re.MULTILINE)
     assert rows == [(c, *p) for c in "46" for p in (("baseline", "10"), ("velocity", "9"))]
-    assert re.search("^ ?seeds 0 to 1 *$", out, re.MULTILINE)
+    assert re.search("^ ?seeds 0 to 1; success: landed after at least 4.2 cm", out, re.MULTILINE)
     assert "seeds 3000 to 3002; policy, 6 cm after 9 cm: success " in out
     assert len(re.findall(r"baseline, [46] cm after 10 cm: success .* of 3; .*, rise", out)) == 2
     assert len(re.findall(r"^  policy against it: success .* McNemar .*, rise", out, re.M)) == 2
-    assert Path("frontier.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("pictures/frontier.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_picture_that_cannot_be_written_is_refused_first(small, monkeypatch):
-    monkeypatch.setattr(frontier, "_point", None)
+    monkeypatch.setattr(frontier, "Series", None)
     with pytest.raises(ConfigError, match="plot"):
-        run_frontier(FrontierOptions(plot=Path("nowhere/frontier.png")))
+        run_frontier(FrontierOptions(plot=Path("shipped/velocity.json")))
+
+
+@pytest.mark.parametrize(
+    ("rise", "landed", "success"),
+    [(0.0421, True, True), (0.0419, True, False), (0.06, False, False)],
+)
+@pytest.mark.parametrize("command", [0.04, 0.08])
+def test_all_are_judged_by_the_policys_command(command, rise, landed, success):
+    jump = {"flight_height": rise, "landed": landed}
+    episode = Episode(7, command, "stood", not success, 0.0, jump)
+    found = judged(episode)
+    assert found == dataclasses.replace(episode, jump_height=0.06, is_success=success)

@@ -19,6 +19,7 @@ from agents.checkpoints import load_latest
 from agents.environment import acting_steps
 from agents.options import read_options
 from agents.training import MOST_CHECKPOINTS
+from agents.workers import JumpVecEnv
 from icub_jump_env.evaluation.rollout import make_env, run_episode
 from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.files import strict_json
@@ -110,9 +111,32 @@ def test_tensorboard_has_the_numbers(whole):
     deviations = [event.value for event in events.Scalars("train/std")]
     steps = [point["timesteps"] for point in points][:-1]
     assert deviations == pytest.approx([np.exp(-1.0 - 0.2 * step / 200) for step in steps])
-    # Half of the scale in the first update, all of it from the second on.
+    # The first update was the value function's.
     sizes = [event.value for event in events.Scalars("rollout/residual_size")]
-    assert 0 < sizes[0] < 0.75 * sizes[1]
+    assert sizes[:2] == [0.0, 0.0] < sizes[2:]
+
+
+def test_actions_grow_to_their_scale(monkeypatch):
+    """Half of it in the first update, all of it from the second on."""
+    scales = []
+    call = JumpVecEnv.env_method
+
+    def env_method(self, name, *arguments):
+        if name == "scale_actions":
+            scales.extend(arguments)
+        return call(self, name, *arguments)
+
+    monkeypatch.setattr(JumpVecEnv, "env_method", env_method)
+    assert train(monkeypatch, "--run", "run", *ARGUMENTS) == 0
+    assert scales == [0.5, 1.0, 1.0]
+
+
+def test_a_run_that_goes_on_with_other_code_says_so(finished, monkeypatch, capsys):
+    (RUN / "checkpoint-000004.safetensors").unlink()
+    (RUN / "checkpoint-000004.json").unlink()
+    monkeypatch.setattr(training, "source", lambda: "0" * 16)
+    assert train(monkeypatch, "--resume", "run") == 0
+    assert capsys.readouterr().err.startswith("run was begun with other code: ")
 
 
 def test_a_killed_run_ends_as_if_it_had_not_been(whole, monkeypatch):

@@ -177,8 +177,17 @@ class TestCommand:
         assert [content["contenders"][n]["sha256"] is None for n in content["contenders"]] == [
             True, False, False,
         ]  # fmt: skip
-        differences = content["differences"]
-        assert list(differences) == ["idle", "busy"]
+        pairs = {(pair["ours"], pair["theirs"]): pair for pair in content["differences"]}
+        assert list(pairs) == [("idle", "baseline"), ("busy", "baseline"), ("busy", "idle")]
+        assert pairs["busy", "idle"]["all"] == pairs["busy", "baseline"]["all"]
+        differences = {pair["ours"]: pair["all"] for pair in content["differences"][:2]}
+        for pair in content["differences"]:
+            groups = pair["by_command"]
+            counted = sum(group["won"] - group["lost"] for group in groups)
+            assert counted == pair["all"]["won"] - pair["all"]["lost"]
+            assert [group["jump_height"] for group in groups] == [
+                group["jump_height"] for group in content["contenders"]["busy"]["by_command"]
+            ]
         assert differences["idle"]["p_value"] == 1.0
         assert differences["idle"]["rise_interval"] == [0.0, 0.0]
         gains = [

@@ -1,5 +1,6 @@
 """Pairs of episodes, and how sure their difference is."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -68,8 +69,13 @@ class TestDifference:
         assert (low, high) != bootstrap_interval(values)
 
     def test_lists_of_different_length_are_no_pairs(self):
-        with pytest.raises(ValueError, match="zip"):
+        with pytest.raises(ValueError, match="same seeds"):
             Difference.of(self.ours[:-1], self.theirs)
+
+    def test_episodes_of_different_seeds_are_no_pairs(self):
+        shifted = [dataclasses.replace(e, seed=e.seed + 1) for e in self.theirs]
+        with pytest.raises(ValueError, match="same seeds"):
+            Difference.of(self.ours, shifted)
 
     def test_in_words(self):
         line = str(Difference.of(self.ours, self.theirs))
