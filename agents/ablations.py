@@ -2,9 +2,8 @@
 
     python -m agents.ablations --jobs 2
 
-prints one row per kind of training in agents/pretrained/runs: the interquartile mean over
-its seeds, and the bootstrap interval of 95 % where there are at least five. An interrupted
-evaluation goes on where it stopped.
+prints one row per kind of training in agents/pretrained/runs: what it reaches and what it
+gains over the baseline. An interrupted evaluation goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -31,18 +30,17 @@ from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.contender import BASELINE, Contender, read_contenders
-from icub_jump_env.evaluation.difference import bootstrap_interval
 from icub_jump_env.evaluation.output import show
 from icub_jump_env.evaluation.parallel import check_jobs
 from icub_jump_env.evaluation.series import Series
-from icub_jump_env.evaluation.summary import Summary, interquartile_mean
+from icub_jump_env.evaluation.summary import CONFIDENCE, interquartile_mean
 from icub_jump_env.evaluation.table import CM
 
 _NAME = re.compile(r"(?P<kind>[\w-]+)-seed\d+")
-_ENOUGH = 5
-"""Seeds for a bootstrap interval to mean something."""
-
 _EPISODES = 200
+_RESAMPLES = 5000
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,29 +72,37 @@ def compare_trainings(options: AblationOptions) -> None:
         if match := _NAME.fullmatch(contender.name):
             kinds[match["kind"]].append(contender)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("training", "seeds", "success, %", "interval", "rise, cm", "interval", "min"):
-        table.add_column(column, justify="left" if column == "training" else "right")
+    table.add_column("training", no_wrap=True)
+    for column in ("seeds", "success, %", "gain", "rise, cm", "gain", "soles, cm", "gain", "min"):
+        table.add_column(column, justify="right", no_wrap=True)
     headline = get_args(ControllerName)
     for kind, members in sorted(kinds.items(), key=lambda item: item[0] not in headline):
         config = judged_config(members[0])
+        baseline = _jumps(config, BASELINE, options, progress)
         if kind in headline:
-            _add(table, f"{kind}, baseline", [_summary(config, BASELINE, options, progress)])
-        summaries = [_summary(config, member, options, progress) for member in members]
-        _add(table, kind, summaries, [_minutes(member.name) for member in members])
+            _add(table, f"{kind}, baseline", baseline)
+        jumps = np.stack([_jumps(config, member, options, progress) for member in members])
+        _add(table, kind, jumps, baseline, [_minutes(member.name) for member in members])
     table.caption = (
-        f"seeds {TEST[0]} to {TEST[options.episodes - 1]}; interquartile mean over the training "
-        "seeds and its bootstrap interval, which is of the training seeds alone and with five of "
-        "them rather narrow"
+        f"seeds {TEST[0]} to {TEST[options.episodes - 1]}; interquartile means over the training "
+        "seeds; gain over the baseline in the same episodes, with its bootstrap interval of 95 %: "
+        "over training seeds and episodes, or over the episodes of a single training"
     )
     table.caption_justify = "left"
     show(console, table)
 
 
-def _summary(
+def _jumps(
     config: JumpConfig, contender: Contender, options: AblationOptions, progress: Console
-) -> Summary:
+) -> Array:
+    """Success (%), rise and height of the soles (cm) of each episode (3, n)."""
     series = Series(config, TEST[: options.episodes], contender)
-    return Summary.of(series.complete(options.jobs, progress))
+    found = [
+        (100.0 * e.is_success, CM * e.jump["flight_height"], CM * e.jump["sole_height"])
+        for e in series.complete(options.jobs, progress)
+    ]
+    jumps: Array = np.nan_to_num(found).T  # without a flight: no height
+    return jumps
 
 
 def _minutes(name: str) -> float:
@@ -106,25 +112,49 @@ def _minutes(name: str) -> float:
 
 
 def _add(
-    table: Table, name: str, summaries: Sequence[Summary], minutes: Sequence[float] = ()
+    table: Table,
+    name: str,
+    jumps: Array,
+    baseline: Array | None = None,
+    minutes: Sequence[float] = (),
 ) -> None:
+    """A row: jumps (seeds, 3, n) against those of the baseline (3, n)."""
     known = [value for value in minutes if not math.isnan(value)]
+    cells = []
+    for quantity, decimals in enumerate((1, 2, 2)):
+        means = np.atleast_2d(jumps[..., quantity, :]).mean(axis=1)
+        cells.append(f"{interquartile_mean(means):.{decimals}f}")
+        if baseline is None:
+            cells.append("-")
+            continue
+        gains = jumps[:, quantity] - baseline[quantity]
+        values = (interquartile_mean(gains.mean(axis=1)), *runs_interval(gains))
+        gain, low, high = (f"{value:+.{decimals}f}" for value in values)
+        cells.append(f"{gain} ({low} to {high})")
     table.add_row(
-        name,
-        str(len(minutes) or "-"),
-        *_cells(np.array([100 * s.success.share for s in summaries]), 1),
-        *_cells(np.array([CM * s.mean_rise for s in summaries]), 2),
-        f"{np.mean(known):.0f}" if known else "-",
+        name, str(len(minutes) or "-"), *cells, f"{np.mean(known):.0f}" if known else "-"
     )
 
 
-def _cells(values: NDArray[np.float64], decimals: int) -> tuple[str, str]:
-    """Interquartile mean and interval."""
-    interval = "-"
-    if len(values) >= _ENOUGH:
-        low, high = bootstrap_interval(values, interquartile_mean)
-        interval = f"{low:.{decimals}f} to {high:.{decimals}f}"
-    return f"{interquartile_mean(values):.{decimals}f}", interval
+def runs_interval(gains: Array) -> tuple[float, float]:
+    """Interval of 95 % of the interquartile mean over training seeds, the same at each call.
+
+    A percentile bootstrap that draws both training seeds and episodes anew.
+
+    Args:
+        gains: Of each training in each episode (seeds, n).
+    """
+    rng = np.random.default_rng(0)
+    runs, episodes = gains.shape
+    means = [
+        gains[np.ix_(rng.integers(runs, size=runs), rng.integers(episodes, size=episodes))].mean(
+            axis=1
+        )
+        for _ in range(_RESAMPLES)
+    ]
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    low, high = np.percentile(interquartile_mean(means, axis=1), [tail, 100.0 - tail])
+    return float(low), float(high)
 
 
 if __name__ == "__main__":

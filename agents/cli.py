@@ -13,6 +13,7 @@ from agents.options import OPTIONS, TrainOptions, read_options
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.cli import guarded, parse, seek
 from icub_jump_env.evaluation.output import say
+from icub_jump_env.evaluation.parallel import WorkerError
 
 _REMEDY = (
     "training needs the extra 'rl': pip install \"icub-jump[rl]\" "
@@ -34,7 +35,7 @@ def _run(arguments: Sequence[str]) -> None:
     console = Console(stderr=True)
     try:
         train(options, console)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, OSError, WorkerError):  # of which none is the run's fault
         if (options.folder / OPTIONS).exists():
             folder = shlex.quote(str(options.folder))
             say(console, f"go on with: python train.py --resume {folder}")

@@ -2,10 +2,10 @@
 
     python -m agents.frontier --controller velocity --jobs 2
 
-The baseline jumps with every command and displacement of a grid, the policy with the same
-commands; posture and gains are as they were tuned for the package. The baselines that come
-nearest to the policy are chosen there, and then meet it on episodes that chose nothing. All are
-judged alike, whatever their command: success is a landing after a rise that is enough for the
+The baseline jumps with every command and displacement of a grid, the policy and the constant
+shift with the same commands; posture and gains are as they were tuned for the package. The baselines that come
+nearest to the policy are chosen there; they and the constant shift then meet it on episodes that
+chose nothing. All are judged alike, whatever their command: success is a landing after a rise that is enough for the
 policy's command. An interrupted run goes on where it stopped.
 """
 
@@ -95,12 +95,14 @@ def run_frontier(options: FrontierOptions) -> None:
     check_jobs(options.jobs)
     if options.plot is not None:
         check_writable("plot", options.plot, folder=True)
-    (policy,) = read_contenders([str(PRETRAINED / f"{options.controller}.safetensors")])
+    names = (f"{options.controller}.safetensors", f"{options.controller}-constant.safetensors")
+    policy, constant = read_contenders([str(PRETRAINED / name) for name in names])
     config = judged_config(policy)
     own = plan_com_trajectory(
         POLICY_COMMAND, config.com_displacement, config.com_scaling
     ).displacement
-    cells = [*((BASELINE, displacement) for displacement in DISPLACEMENTS), (policy, own)]
+    cells = [(BASELINE, displacement) for displacement in DISPLACEMENTS]
+    cells += [(constant, own), (policy, own)]
 
     def jumps(contender: Contender, command: float, displacement: float, seeds: range) -> Episodes:
         jump = dataclasses.replace(config, jump_height=command, com_displacement=displacement)
@@ -117,14 +119,18 @@ def run_frontier(options: FrontierOptions) -> None:
         file = save_figure(options.plot, "frontier.png", frontier_figure(points))
         say(progress, f"wrote {file}")
     show(console, render(points))
-    ours = next(p for p in points if p.contender is policy and p.jump_height == POLICY_COMMAND)
+    ours, shifted = (
+        next(p for p in points if p.contender is contender and p.jump_height == POLICY_COMMAND)
+        for contender in (policy, constant)
+    )
 
     def meet(point: Point) -> Episodes:
         return jumps(point.contender, point.jump_height, point.displacement, TEST)
 
     jumped = meet(ours)
     say(console, f"seeds {TEST[0]} to {TEST[-1]}; policy, {ours}: {_words(jumped)}")
-    for role, rival in strongest([p for p in points if p.contender is BASELINE], ours).items():
+    rivals = strongest([p for p in points if p.contender is BASELINE], ours)
+    for role, rival in {**rivals, "constant shift": shifted}.items():
         theirs = meet(rival)
         say(console, f"{role}, {rival}: {_words(theirs)}")
         say(console, f"  policy against it: {Difference.of(jumped, theirs)}")
@@ -170,7 +176,7 @@ def render(points: Sequence[Point]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("command, cm", "policy", "displacement, cm"):
         table.add_column(column)
-    for column in ("landed, %", "success, %", "rise, cm"):
+    for column in ("landed, %", "success, %", "rise, cm", "soles, cm"):
         table.add_column(column, justify="right")
     for point, following in zip(points, [*points[1:], None], strict=True):
         summary = point.summary
@@ -181,6 +187,7 @@ def render(points: Sequence[Point]) -> Table:
             f"{100 * summary.landed.share:.0f}",
             f"{100 * summary.success.share:.0f}",
             f"{CM * summary.mean_rise:.2f}",
+            f"{CM * summary.mean_sole_height:.2f}",
             end_section=following is None or following.jump_height != point.jump_height,
         )
     table.caption = (
@@ -193,7 +200,10 @@ def render(points: Sequence[Point]) -> Table:
 
 def _words(episodes: Episodes) -> str:
     summary = Summary.of(episodes)
-    return f"success {summary.success}, rise {CM * summary.mean_rise:.2f} cm"
+    return (
+        f"success {summary.success}, rise {CM * summary.mean_rise:.2f} cm, "
+        f"soles {CM * summary.mean_sole_height:.2f} cm"
+    )
 
 
 if __name__ == "__main__":

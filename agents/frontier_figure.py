@@ -17,8 +17,9 @@ def frontier_figure(points: Sequence[Point]) -> Figure:
     """Mean rise over the share that lands; labels name command and displacement (cm)."""
     figure = Figure(figsize=(6.5, 4.2), dpi=120, layout="constrained")
     axis = figure.subplots()
-    for is_baseline, name, color in ((True, "baseline", "0.45"), (False, "policy", "tab:blue")):
-        shown = [p for p in points if p.contender.is_baseline == is_baseline]
+    names = dict.fromkeys(point.contender.name for point in points)
+    for name, color in zip(names, ("0.45", "tab:orange", "tab:blue"), strict=True):
+        shown = [p for p in points if p.contender.name == name]
         shares = [100 * p.summary.landed.share for p in shown]
         rises = [CM * p.summary.mean_rise for p in shown]
         axis.plot(shares, rises, "o", color=color, label=name)

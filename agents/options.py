@@ -150,7 +150,7 @@ class TrainOptions:
         if self.env.render_mode is not None:
             raise ConfigError("render_mode", self.env.render_mode, "not in a training")
         if self.ppo.episodes % self.jobs:
-            raise ConfigError("ppo.episodes", self.ppo.episodes, f"a multiple of jobs={self.jobs}")
+            raise ConfigError("jobs", self.jobs, f"a divisor of ppo.episodes={self.ppo.episodes}")
         if self.resume is not None and self.run not in (None, self.resume):
             raise ConfigError("run", str(self.run), "not with --resume, which names it")
 
@@ -183,6 +183,8 @@ def read_options(path: Path) -> TrainOptions:
         ConfigError: If it is not a file of options, or a value is out of range.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise OSError("it is none")
         values = json.loads(path.read_text())
     except (OSError, ValueError, RecursionError) as error:
         raise ConfigError("config", str(path), f"a JSON file ({error})") from None

@@ -79,6 +79,8 @@ def train(options: TrainOptions, console: Console) -> None:
         if checkpoint is not None and checkpoint.num_timesteps >= options.timesteps:
             say(console, f"{folder} is finished")
             return
+        if checkpoint is None and options.resume is not None:
+            say(console, f"no checkpoint in {folder}: starting from step 0")
         make = partial(LaunchEnv, options.env, options.input_names, options.axes)
         numbers = range(options.jobs)
         with contextlib.closing(JumpVecEnv([partial(make, number) for number in numbers])) as env:

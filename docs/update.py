@@ -34,29 +34,28 @@ def output_of(command: str) -> str:
     arguments = [sys.executable, *shlex.split(command)[1:]]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     result = subprocess.run(
-        arguments, cwd=REPOSITORY, env=environment, check=True, capture_output=True, text=True
+        arguments, cwd=REPOSITORY, env=environment, check=False, stdout=subprocess.PIPE, text=True
     )
+    if result.returncode != 0:
+        sys.exit(f"failed: {command}")
     lines = [line.rstrip() for line in result.stdout.splitlines()]
     return "\n".join(lines).strip()
 
 
-def updated(text: str, output: Callable[[str], str] = output_of) -> str:
-    """The document with fresh output in every block."""
-
-    def fresh(match: re.Match[str]) -> str:
-        command, fence = match["command"], match["fence"] or ""
-        body = output(command)
-        block = f"{fence}\n{body}\n{fence}" if fence else body
-        return f"<!-- {command} -->\n{block}\n"
-
-    return BLOCK.sub(fresh, text)
+def fresh(block: re.Match[str], output: Callable[[str], str] = output_of) -> str:
+    """A block with fresh output."""
+    command, fence = block["command"], block["fence"] or ""
+    body = output(command)
+    shown = f"{fence}\n{body}\n{fence}" if fence else body
+    return f"<!-- {command} -->\n{shown}\n"
 
 
 def main() -> None:
-    """Update README.md and all documents."""
+    """Update README.md and all documents, each block as soon as its command has run."""
     for file in (REPOSITORY / "README.md", *sorted(DOCS.glob("*.md"))):
-        print(file.relative_to(REPOSITORY))
-        file.write_text(updated(file.read_text()))
+        for block in BLOCK.finditer(file.read_text()):
+            print(f"{file.relative_to(REPOSITORY)}: {block['command']}")
+            file.write_text(file.read_text().replace(block[0], fresh(block)))
 
 
 if __name__ == "__main__":

@@ -44,6 +44,10 @@ def run_compare(
         f"{ranges(config)}, seeds {seeds[0]} to {seeds[-1]} for each",
     )
     show(console, render(episodes))
+    for name, done in episodes.items():
+        failures = Summary.of(done).failures.items()
+        counts = ", ".join(f"{len(seeds)} {kind}" for kind, seeds in failures)
+        say(console, f"{name} failed: {counts or 'never'}")
     for ours, theirs in _pairs(contenders):
         difference = Difference.of(episodes[ours], episodes[theirs])
         say(console, f"{ours} against {theirs}: {difference}")
@@ -124,6 +128,7 @@ def render(episodes: dict[str, list[Episode]]) -> Table:
         "95 % interval",
         "landed",
         "rise, cm",
+        "soles, cm",
         "off by, cm",
         "rotation, deg",
         "landing, N",
@@ -145,8 +150,8 @@ def render(episodes: dict[str, list[Episode]]) -> Table:
                 label if row == 0 else "", escape(name), *_cells(series), end_section=last
             )
     table.caption = (
-        "success: landed after at least 0.7 of the command; rise and distance from the command: "
-        "means of all episodes, the rest medians"
+        "success: landed after at least 0.7 of the command; rise of the CoM, height of the soles "
+        "and distance from the command: means of all episodes, the rest medians"
     )
     table.caption_justify = "left"
     return table
@@ -160,6 +165,7 @@ def _cells(episodes: Sequence[Episode]) -> list[str]:
         f"{100 * low:.1f} to {100 * high:.1f}",
         f"{100 * summary.landed.share:.1f} %",
         number(CM * summary.mean_rise, "cm"),
+        number(CM * summary.mean_sole_height, "cm"),
         number(CM * summary.mean_height_error, "cm"),
         number(DEG * summary.median_rotation, "deg"),
         number(summary.median("landing_force"), "N"),

@@ -33,6 +33,8 @@ class Difference:
         success_interval: Its interval of 95 %, see :func:`paired_interval`.
         rise: Gain in the mean flight height (m).
         rise_interval: Its bootstrap interval of 95 %.
+        sole_height: Gain in the mean height of the soles (m).
+        sole_height_interval: Its bootstrap interval of 95 %.
     """
 
     won: int
@@ -42,6 +44,8 @@ class Difference:
     success_interval: Interval
     rise: float
     rise_interval: Interval
+    sole_height: float
+    sole_height_interval: Interval
 
     @classmethod
     def of(cls, ours: Sequence[Episode], theirs: Sequence[Episode]) -> Difference:
@@ -54,7 +58,10 @@ class Difference:
             raise ValueError("pairs of episodes have the same seeds in the same order")
         gains = np.array([o.is_success - t.is_success for o, t in zip(ours, theirs, strict=True)])
         won, lost = int((gains > 0).sum()), int((gains < 0).sum())
-        rises = _heights(ours) - _heights(theirs)
+        rises, soles = (
+            _values(ours, metric) - _values(theirs, metric)
+            for metric in ("flight_height", "sole_height")
+        )
         return cls(
             won=won,
             lost=lost,
@@ -63,16 +70,18 @@ class Difference:
             success_interval=paired_interval(won, lost, len(gains)),
             rise=float(rises.mean()),
             rise_interval=bootstrap_interval(rises),
+            sole_height=float(soles.mean()),
+            sole_height_interval=bootstrap_interval(soles),
         )
 
     def __str__(self) -> str:
         low, high = (100 * bound for bound in self.success_interval)
-        shallow, steep = (CM * bound for bound in self.rise_interval)
         p = "p < 0.001" if self.p_value < 0.001 else f"p = {self.p_value:.3f}"
         return (
             f"success {100 * self.success:+.1f} points (95 % interval {low:+.1f} to {high:+.1f}; "
             f"won {self.won}, lost {self.lost}, McNemar {p}), "
-            f"rise {CM * self.rise:+.2f} cm ({shallow:+.2f} to {steep:+.2f})"
+            f"rise {_centimetres(self.rise, self.rise_interval)}, "
+            f"soles {_centimetres(self.sole_height, self.sole_height_interval)}"
         )
 
 
@@ -112,5 +121,11 @@ def bootstrap_interval(values: NDArray[Any], statistic: Callable[..., Any] = np.
     return float(interval.low), float(interval.high)
 
 
-def _heights(episodes: Sequence[Episode]) -> NDArray[np.float64]:
-    return np.array([episode.jump["flight_height"] for episode in episodes])
+def _values(episodes: Sequence[Episode], metric: str) -> NDArray[np.float64]:
+    """A height of each episode, zero where there was no flight."""
+    return np.nan_to_num([float(episode.jump[metric]) for episode in episodes])
+
+
+def _centimetres(value: float, interval: Interval) -> str:
+    low, high = interval
+    return f"{CM * value:+.2f} cm ({CM * low:+.2f} to {CM * high:+.2f})"

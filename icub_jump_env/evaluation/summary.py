@@ -61,7 +61,9 @@ class Summary:
     Attributes:
         success: At least 0.7 of the commanded height, and landed.
         landed: Landed and stands.
-        mean_rise: Mean flight height (m) of all episodes.
+        mean_rise: Mean flight height (m) of all episodes: the CoM's rise after take-off.
+        mean_sole_height: Mean height of the soles (m); zero without a flight. It tells a higher
+            jump from an earlier take-off.
         mean_height_error: Mean distance of the flight height from the command (m).
         median_rotation: Median size of the rotation in flight (rad); NaN without a flight.
         percentiles: 10th, 50th and 90th percentile of each metric, SI units, over the
@@ -72,6 +74,7 @@ class Summary:
     success: Rate
     landed: Rate
     mean_rise: float
+    mean_sole_height: float
     mean_height_error: float
     median_rotation: float
     percentiles: Mapping[str, tuple[float, float, float]]
@@ -92,6 +95,7 @@ class Summary:
             success=Rate(sum(e.is_success for e in episodes), len(episodes)),
             landed=Rate(sum(bool(e.jump["landed"]) for e in episodes), len(episodes)),
             mean_rise=float(values["flight_height"].mean()),
+            mean_sole_height=float(np.nan_to_num(values["sole_height"]).mean()),
             mean_height_error=float(errors.mean()),
             median_rotation=_percentiles(np.abs(values["flight_rotation"]))[1],
             percentiles={metric: _percentiles(found) for metric, found in values.items()},

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import trim_mean
 
 from agents import ablations, shipped
-from agents.ablations import AblationOptions, compare_trainings
+from agents.ablations import AblationOptions, compare_trainings, runs_interval
 from agents.learning_figure import learning_curves
 from agents.options import TASK
 from agents.rivals import constant_shift
@@ -52,24 +52,54 @@ def test_each_kind_has_a_row_with_what_its_policies_do(runs, capsys):
     compare_trainings(AblationOptions(episodes=2))
     out = capsys.readouterr().out
     env = make_env(CONFIG)
-    rises = {
-        name: 100 * np.mean([run_episode(env, s, policy).jump["flight_height"] for s in SEEDS])
+    heights = {
+        name: [
+            100 * np.mean([run_episode(env, s, policy).jump[metric] for s in SEEDS])
+            for metric in ("flight_height", "sole_height")
+        ]
         for name, policy in SHIFTS.items()
     }
-    still = rises.pop("velocity-still-seed0")
+    rises, soles = zip(*list(heights.values())[:5], strict=True)
     rows = {
-        line.split("  ")[0].strip(): line.split()
+        line.split("  ")[0].strip(): re.split("  +", line.strip())[1:]
         for line in out.splitlines()
         if "velocity" in line
     }
-    assert rows["velocity, baseline"][2] == "-"
-    assert rows["velocity, baseline"][-3:] == [f"{still:.2f}", "-", "-"]
-    assert rows["velocity-still"][-3:] == [f"{still:.2f}", "-", "7"]
-    seeds, *_, rise, low, to, high, minutes = rows["velocity"][1:]
-    assert (seeds, to, minutes) == ("5", "to", "7")
-    assert float(rise) == pytest.approx(trim_mean(list(rises.values()), 0.25), abs=0.006)
-    assert min(rises.values()) - 0.006 <= float(low) < float(high) <= max(rises.values()) + 0.006
-    assert re.search("seeds 3000 to 3001; interquartile mean over the training", out)
+    assert list(rows) == ["velocity, baseline", "velocity", "velocity-still"]
+    seeds, _, nothing, *_, minutes = rows["velocity, baseline"]
+    assert (seeds, nothing, minutes) == ("-", "-", "-")
+    seeds, _, won, rise, _, sole, higher, minutes = rows["velocity-still"]
+    assert (seeds, won, higher, minutes) == (
+        "1", "+0.0 (+0.0 to +0.0)", "+0.00 (+0.00 to +0.00)", "7",
+    )  # fmt: skip
+    assert [rise, sole] == [f"{value:.2f}" for value in heights["velocity-still-seed0"]]
+    seeds, _, _, rise, gain, sole, _, minutes = rows["velocity"]
+    assert (seeds, minutes) == ("5", "7")
+    assert float(rise) == pytest.approx(trim_mean(rises, 0.25), abs=0.006)
+    assert float(sole) == pytest.approx(trim_mean(soles, 0.25), abs=0.006)
+    gain, low, high = map(float, re.findall(r"[+-][\d.]+", gain))
+    assert gain == pytest.approx(trim_mean(rises, 0.25) - rises[0], abs=0.006)
+    assert low < gain < high
+    assert "seeds 3000 to 3001; interquartile means over the training seeds" in out
+
+
+class TestRunsInterval:
+    def test_where_only_the_training_seeds_differ(self):
+        """The middle of 5 equal to their number 0 to 4: the same interval for any episodes."""
+        one, many = (np.repeat(np.arange(5.0)[:, None], n, axis=1) for n in (1, 50))
+        low, high = runs_interval(many)
+        assert (low, high) == runs_interval(one)
+        assert 0.0 < low < 1.0
+        assert 3.0 < high < 4.0
+
+    def test_where_only_the_episodes_differ_it_is_that_of_their_mean(self, rng):
+        gains = rng.normal(2.0, 1.0, 400)
+        half = 1.96 * gains.std() / 20
+        for seeds in (1, 5):
+            found = runs_interval(np.tile(gains, (seeds, 1)))
+            assert found == pytest.approx(
+                (gains.mean() - half, gains.mean() + half), abs=0.1 * half
+            )
 
 
 def test_without_runs_it_says_how_to_make_them(monkeypatch):

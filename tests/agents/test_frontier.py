@@ -54,21 +54,26 @@ def small(monkeypatch):
     }.items():  # fmt: skip
         monkeypatch.setattr(frontier, name, value)
     Path("shipped").mkdir()
-    save_policy(
-        "shipped/velocity.safetensors", constant_shift(0.0, 0.0), config=task, versions={},
-        command=("python", "x"), seed=None, results={},
-    )  # fmt: skip
+    for name, shift in (("velocity", 0.0), ("velocity-constant", 0.2)):
+        save_policy(
+            f"shipped/{name}.safetensors", constant_shift(shift, 0.0), config=task, versions={},
+            command=("python", "x"), seed=None, results={},
+        )  # fmt: skip
 
 
 def test_the_command_prints_the_grid_and_the_meeting(small, capsys):
     run_frontier(FrontierOptions(plot=Path("pictures")))
     out = capsys.readouterr().out
-    rows = re.findall(r"^ (\d)  +(baseline|velocity) +(9|10) +", out, re.MULTILINE)
-    assert rows == [(c, *p) for c in "46" for p in (("baseline", "10"), ("velocity", "9"))]
+    rows = re.findall(
+        r"^ (\d)  +(baseline|velocity|velocity-constant) +(9|10) +", out, re.MULTILINE
+    )
+    cells = ("baseline", "10"), ("velocity-constant", "9"), ("velocity", "9")
+    assert rows == [(command, *cell) for command in "46" for cell in cells]
     assert re.search("^ ?seeds 0 to 1; success: landed after at least 4.2 cm", out, re.MULTILINE)
     assert "seeds 3000 to 3002; policy, 6 cm after 9 cm: success " in out
     assert len(re.findall(r"baseline, [46] cm after 10 cm: success .* of 3; .*, rise", out)) == 2
-    assert len(re.findall(r"^  policy against it: success .* McNemar .*, rise", out, re.M)) == 2
+    assert "\nconstant shift, 6 cm after 9 cm: success " in out
+    assert len(re.findall(r"^  policy against it: success .* McNemar .*, rise", out, re.M)) == 3
     assert Path("pictures/frontier.png").read_bytes().startswith(b"\x89PNG")
 
 

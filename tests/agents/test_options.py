@@ -75,7 +75,7 @@ def test_a_missing_file_is_refused(tmp_path):
         ({"seed": 2**32}, "seed=4294967296 is not allowed: a whole number from 0 to 4294967295"),
         ({"jobs": 0}, "jobs=0 is not allowed: a whole number from 1 to 1000"),
         ({"checkpoint_every": 0}, "checkpoint_every=0 is not allowed: a whole number from 1"),
-        ({"jobs": 7}, "ppo.episodes=64 is not allowed: a multiple of jobs=7"),
+        ({"jobs": 7}, "jobs=7 is not allowed: a divisor of ppo.episodes=64"),
         ({"env": JumpConfig(render_mode="rgb_array")}, "render_mode='rgb_array' is not allowed"),
     ],
 )

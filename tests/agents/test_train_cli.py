@@ -126,7 +126,7 @@ def test_a_runs_options_are_those_of_another(asked):
         (["--ppo.hidden", "0"], ["hidden", "0", "from 1 to 512"]),
         (["--jump-height", "7"], ["jump_height", "7", "0.01 to 0.15"]),
         (["--axes", "up"], ["axes", "forward", "lateral", "vertical"]),
-        (["--jobs", "7"], ["ppo.episodes", "64", "multiple of jobs=7"]),
+        (["--jobs", "7"], ["jobs=7", "divisor of ppo.episodes=64"]),
         (["--render-mode", "human"], ["render_mode", "human"]),
         (["--resume"], ["--resume"]),
         (["--resume", "nowhere"], ["resume", "nowhere", "the folder of a run"]),

@@ -27,7 +27,7 @@ def two_ranges(pattern, rise):
     return [
         episode(
             seed, None if char == "1" else Failure.SLIPPED, jump_height=0.04 if seed < 4 else 0.06,
-            flight_height=rise, flight_rotation=0.1, landing_force=1000.0, joint_work=100.0,
+            flight_height=rise, sole_height=rise - 0.003, flight_rotation=0.1, landing_force=1000.0, joint_work=100.0,
         )
         for seed, char in enumerate(pattern)
     ]  # fmt: skip
@@ -56,7 +56,13 @@ class TestTable:
             assert any(row[: len(expected)] == expected for row in rows), expected
         assert rows[1][:2] == ["command", "policy"]
         (last,) = [row for row in rows if row[:2] == ["second", "87.5 %"]]
-        assert last[4:] == ["5.00", "1.00", "5.7", "1000", "100"]
+        assert last[4:] == ["5.00", "4.70", "1.00", "5.7", "1000", "100"]
+
+    def test_what_does_not_exist_is_a_dash(self):
+        rows = printed(render({"idle": [episode(0, Failure.NO_TAKEOFF)]}))
+        (row,) = [[cell for cell in map(str.strip, r) if cell] for r in rows if "idle" in str(r)]
+        # Soles, distance from the command, rotation, landing force; no work was measured here.
+        assert row[-5:] == ["0.00", "4.00", "-", "-", "0"]
 
     def test_one_command_needs_no_row_for_all(self):
         text = str(printed(render({name: arm[:4] for name, arm in ARMS.items()})))
@@ -201,8 +207,14 @@ class TestCommand:
         )
         assert (
             "idle against baseline: success +0.0 points (95 % interval -39.2 to +39.2; won 0, "
-            "lost 0, McNemar p = 1.000), rise +0.00 cm (+0.00 to +0.00)\n" in out
+            "lost 0, McNemar p = 1.000), rise +0.00 cm (+0.00 to +0.00), "
+            "soles +0.00 cm (+0.00 to +0.00)\n" in out
         )
+        for name in ("baseline", "idle", "busy"):
+            failed = [e["failure"] for e in found[name] if e["failure"]]
+            counts = [f"{failed.count(kind)} {kind}" for kind in sorted(set(failed))]
+            (line,) = [line for line in out.splitlines() if line.startswith(f"{name} failed: ")]
+            assert sorted(line.split(": ")[1].split(", ")) == (sorted(counts) or ["never"])
         line = next(line for line in out.splitlines() if line.startswith("busy against baseline"))
         assert f"rise {100 * np.mean(gains):+.2f} cm" in line
         assert not [line for line in out.splitlines() if line.startswith("baseline against")]

@@ -81,7 +81,7 @@ class TestDifference:
         line = str(Difference.of(self.ours, self.theirs))
         assert line.startswith("success +70.0 points (95 % interval +18.6 to +98.1; ")
         assert "won 8, lost 1, McNemar p = 0.039" in line
-        assert "rise +0.30 cm (+0.30 to +0.30)" in line
+        assert line.endswith("rise +0.30 cm (+0.30 to +0.30), soles +0.00 cm (+0.00 to +0.00)")
         worse = str(Difference.of(outcomes("0" * 20), outcomes("1" * 20, rise=0.0412)))
         assert "success -100.0 points (95 % interval -100.0 to -76.0;" in worse
         assert "McNemar p < 0.001" in worse

@@ -58,6 +58,10 @@ class TestSummary:
         assert found.median("landing_force") == pytest.approx(850.0)
         assert found.median("joint_work") == pytest.approx(80.0)
 
+    def test_without_a_flight_the_soles_rise_nowhere(self):
+        episodes = [episode(0, sole_height=0.03), episode(1, Failure.NO_TAKEOFF)]
+        assert Summary.of(episodes).mean_sole_height == pytest.approx(0.015)
+
     def test_where_nobody_flew(self):
         found = Summary.of([episode(0, Failure.NO_TAKEOFF)])
         assert math.isnan(found.median_rotation)
