@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args
 import tyro
 from rich.console import Console
 
-from icub_jump_env.errors import ICubJumpError
+from icub_jump_env.errors import ICubJumpError, PolicyMismatchError
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.opengl import import_mujoco
 
@@ -143,7 +143,10 @@ def _evaluate(arguments: Sequence[str]) -> None:
     contenders = read_contenders([str(word) for word in words])
     for contender in contenders:
         if contender.card is not None:
-            check_match(contender.card, options.config)
+            try:
+                check_match(contender.card, options.config)
+            except PolicyMismatchError as error:
+                raise ICubJumpError(f"{contender.name}: {error}") from error
     console, progress = Console(), Console(stderr=True)
     _run_mode(options, contenders, console, progress)
     if options.video is not None:

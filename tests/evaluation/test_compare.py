@@ -272,7 +272,7 @@ class TestCommand:
         other = save(tmp_path / "other.safetensors", FEEDBACK, com_displacement=0.1)
         code, out, err = evaluate(capsys, "--compare", *files, other, "--episodes", "2")
         assert (code, out) == (2, "")
-        assert err.startswith("error: ")
+        assert err.startswith("error: other: ")
         assert err.count("\n") == 1
         assert "com_displacement=None instead of 0.1" in err
 
