@@ -38,7 +38,10 @@ from icub_jump_env.evaluation.summary import Summary
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
 from icub_jump_env.policy.saving import LoadedPolicy
 
-IMAGES = Path("docs/images")
+REPOSITORY = Path(__file__).parents[1]
+EVIDENCE = Path("runs/evidence")
+"""Where the runs are, in it."""
+
 HEADLINE_SEEDS = range(5)
 PLAN_SEEDS = range(2)
 ABLATION_SEEDS = range(1)
@@ -113,19 +116,19 @@ def remake(options: EvidenceOptions) -> None:
     for controller in get_args(ControllerName):
         shipped = _ship(controller, options.jobs, console)
         _make_rivals(controller, shipped, options.jobs, console)
-    learning_curves(RUNS).savefig(IMAGES / "learning.png")
+    learning_curves(RUNS).savefig(REPOSITORY / "docs" / "images" / "learning.png")
     _run("docs/update.py")
 
 
 def _train(name: str, arguments: tuple[str, ...]) -> None:
     """Train or go on, and keep the best policy and the learning curve."""
-    folder = Path("runs/evidence") / name
-    words = (*arguments, "--run", str(folder))
+    words = (*arguments, "--run", str(EVIDENCE / name))
+    folder = REPOSITORY / EVIDENCE / name
     if (folder / OPTIONS).exists():
         if read_options(folder / OPTIONS).as_dict() != parse(TrainOptions, arguments).as_dict():
-            raise EvidenceError(f"{folder} holds a run with other options: remove it")
+            raise EvidenceError(f"{EVIDENCE / name} holds a run with other options: remove it")
         _check_code(folder, LAST)
-        words = ("--resume", str(folder))
+        words = ("--resume", str(EVIDENCE / name))
     _run("train.py", *words)
     _check_code(folder, BEST)
     RUNS.mkdir(parents=True, exist_ok=True)
@@ -142,7 +145,7 @@ def _check_code(folder: Path, name: str) -> None:
 
 def _run(*words: str) -> None:
     try:
-        subprocess.run([sys.executable, *words], check=True)
+        subprocess.run([sys.executable, *words], cwd=REPOSITORY, check=True)
     except subprocess.CalledProcessError as error:
         raise EvidenceError(f"failed: python {shlex.join(words)}") from error
 

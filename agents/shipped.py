@@ -9,7 +9,7 @@ from agents.options import TASK
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.contender import Contender, as_trained
 
-PRETRAINED = Path("agents/pretrained")
+PRETRAINED = Path(__file__).parent / "pretrained"
 """Policies."""
 
 RUNS = PRETRAINED / "runs"

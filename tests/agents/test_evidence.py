@@ -12,7 +12,7 @@ from agents.options import TrainOptions
 from icub_jump_env.evaluation.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy
 
-SHIPPED, RUNS = Path("agents/pretrained"), Path("agents/pretrained/runs")
+SHIPPED, RUNS = Path("shipped"), Path("shipped/runs")
 
 
 @pytest.fixture
@@ -26,6 +26,8 @@ def calls(monkeypatch):
             assert train(monkeypatch, *words[1:]) == 0
 
     monkeypatch.setattr(evidence, "_run", run)
+    for name, folder in {"REPOSITORY": Path(), "PRETRAINED": SHIPPED, "RUNS": RUNS}.items():
+        monkeypatch.setattr(evidence, name, folder)
     monkeypatch.setattr(evidence, "HEADLINE_SEEDS", range(2))
     monkeypatch.setattr(evidence, "PLAN_SEEDS", range(1))
     monkeypatch.setattr(evidence, "ABLATIONS", {"forward": ("--axes", "forward")})
