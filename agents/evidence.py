@@ -43,7 +43,6 @@ EVIDENCE = Path("runs/evidence")
 """Where the runs are, in it."""
 
 HEADLINE_SEEDS = range(5)
-PLAN_SEEDS = range(2)
 ABLATION_SEEDS = range(1)
 
 ABLATIONS = {
@@ -86,12 +85,11 @@ def trainings() -> dict[str, tuple[str, ...]]:
     for seed in HEADLINE_SEEDS:
         for controller in get_args(ControllerName):
             named[f"{controller}-seed{seed}"] = ("--controller", controller, "--seed", str(seed))
-    for seed in PLAN_SEEDS:
+    for seed in ABLATION_SEEDS:
         for controller in get_args(ControllerName):
             words = ("--controller", controller, *PLAN, "--seed", str(seed))
             named[f"{controller}-plan-seed{seed}"] = words
-    for name, arguments in ABLATIONS.items():
-        for seed in ABLATION_SEEDS:
+        for name, arguments in ABLATIONS.items():
             named[f"velocity-{name}-seed{seed}"] = (*arguments, "--seed", str(seed))
     return named
 

@@ -29,7 +29,6 @@ def calls(monkeypatch):
     for name, folder in {"REPOSITORY": Path(), "PRETRAINED": SHIPPED, "RUNS": RUNS}.items():
         monkeypatch.setattr(evidence, name, folder)
     monkeypatch.setattr(evidence, "HEADLINE_SEEDS", range(2))
-    monkeypatch.setattr(evidence, "PLAN_SEEDS", range(1))
     monkeypatch.setattr(evidence, "ABLATIONS", {"forward": ("--axes", "forward")})
     monkeypatch.setattr(evidence, "ABLATION_SEEDS", range(1))
     named = trainings()
