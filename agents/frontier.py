@@ -3,10 +3,11 @@
     python -m agents.frontier --controller velocity --jobs 2
 
 The baseline jumps with every command and displacement of a grid, the policy and the constant
-shift with the same commands; posture and gains are as they were tuned for the package. The baselines that come
-nearest to the policy are chosen there; they and the constant shift then meet it on episodes that
-chose nothing. All are judged alike, whatever their command: success is a landing after a rise that is enough for the
-policy's command. An interrupted run goes on where it stopped.
+shift with the same commands; posture and gains are as they were tuned for the package. The
+baselines that come nearest to the policy are chosen there; they and the constant shift then meet
+it on episodes that chose nothing. All are judged alike, whatever their command: success is a
+landing after a rise that is enough for the policy's command. An interrupted run goes on where it
+stopped.
 """
 
 from __future__ import annotations
