@@ -86,7 +86,8 @@ def compare_trainings(options: AblationOptions) -> None:
     table.caption = (
         f"seeds {TEST[0]} to {TEST[options.episodes - 1]}; interquartile means over the training "
         "seeds; gain over the baseline in the same episodes, with its bootstrap interval of 95 %: "
-        "over training seeds and episodes, or over the episodes of a single training"
+        "over training seeds and episodes (of few seeds: too narrow rather than too wide), or over "
+        "the episodes of a single training, whose luck it does not show"
     )
     table.caption_justify = "left"
     show(console, table)

@@ -106,8 +106,9 @@ def remake(options: EvidenceOptions) -> None:
     for name, arguments in trainings().items():
         say(console, f"run {name}")
         _train(name, arguments)
-    for file in RUNS.glob("*"):
+    for file in RUNS.glob("*-seed*.*"):
         if file.name.split(".")[0] not in trainings():
+            say(console, f"removing {file}, which is no longer trained")
             file.unlink()
     if options.train_only:
         return
