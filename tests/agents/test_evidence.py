@@ -102,5 +102,5 @@ def test_a_command_that_fails_ends_it_with_its_words():
 
 def test_every_kind_of_training_has_its_seeds():
     named = trainings()
-    assert len(named) == 2 * 5 + 2 * 2 + len(evidence.ABLATIONS)
+    assert len(named) == 2 * 5 + 2 + len(evidence.ABLATIONS)
     assert named["torque-seed4"] == ("--controller", "torque", "--seed", "4")
