@@ -39,7 +39,7 @@ def output_of(command: str) -> str:
     if result.returncode != 0:
         sys.exit(f"failed: {command}")
     lines = [line.rstrip() for line in result.stdout.splitlines()]
-    return "\n".join(lines).strip()
+    return "\n".join(lines).strip("\n")
 
 
 def fresh(block: re.Match[str], output: Callable[[str], str] = output_of) -> str:
