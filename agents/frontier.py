@@ -99,8 +99,10 @@ def run_frontier(options: FrontierOptions) -> None:
     names = (f"{options.controller}.safetensors", f"{options.controller}-constant.safetensors")
     policy, constant = read_contenders([str(PRETRAINED / name) for name in names])
     config = judged_config(policy)
+    own = config.com_displacement
+    assert own is not None  # the task has one
     cells = [(BASELINE, displacement) for displacement in DISPLACEMENTS]
-    cells += [(constant, config.com_displacement), (policy, config.com_displacement)]
+    cells += [(constant, own), (policy, own)]
 
     def jumps(contender: Contender, command: float, displacement: float, seeds: range) -> Episodes:
         jump = dataclasses.replace(config, jump_height=command, com_displacement=displacement)
