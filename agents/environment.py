@@ -18,7 +18,7 @@ from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
 from icub_jump_env.observation import OBSERVATION_LIMIT, entry_scales
 from icub_jump_env.policy import Policy
 from icub_jump_env.policy.fields import AXES
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
+from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 
 Array = NDArray[np.float32]
 

@@ -11,7 +11,13 @@ from __future__ import annotations
 
 import gymnasium
 
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import JumpConfig, RenderConfig
+from icub_jump_env.control.config import (
+    ContactConfig,
+    PhaseConfig,
+    TorqueConfig,
+    VelocityConfig,
+)
 from icub_jump_env.errors import (
     ActionError,
     CommandNotScalableError,
@@ -19,7 +25,11 @@ from icub_jump_env.errors import (
     ICubJumpError,
     InvalidValueError,
     MissingDependencyError,
+    UnknownFieldError,
 )
+from icub_jump_env.metrics.jump import SuccessConfig
+from icub_jump_env.planning.residual import ResidualConfig
+from icub_jump_env.reward import RewardConfig
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor, RatedMotor
 from icub_jump_env.simulation.actuators.servo import ServoGains
@@ -50,6 +60,7 @@ __all__ = [
     "ActuatorConfig",
     "CommandNotScalableError",
     "ConfigError",
+    "ContactConfig",
     "CurrentControl",
     "DCMotor",
     "ICubJumpError",
@@ -57,10 +68,18 @@ __all__ = [
     "InvalidValueError",
     "JumpConfig",
     "MissingDependencyError",
+    "PhaseConfig",
     "Randomization",
     "RatedMotor",
+    "RenderConfig",
+    "ResidualConfig",
+    "RewardConfig",
     "SensorConfig",
     "SensorError",
     "ServoGains",
+    "SuccessConfig",
+    "TorqueConfig",
     "TorqueFeedback",
+    "UnknownFieldError",
+    "VelocityConfig",
 ]

@@ -1,10 +1,10 @@
-"""The configuration of a jump: one frozen, validated dataclass."""
+"""The configuration of a jump: one frozen, validated dataclass of groups."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, Self, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -14,17 +14,32 @@ from icub_jump_env.checks import (
     check_count,
     check_flag,
     check_number,
-    check_numbers,
     check_range,
+    check_type,
     is_multiple,
+    store,
 )
-from icub_jump_env.control.solvers import SolverName
-from icub_jump_env.errors import ConfigError
-from icub_jump_env.reference.com_trajectory import (
+from icub_jump_env.control.config import (
+    CONTROLLERS,
+    Constraints,
+    ControllerConfig,
+    ControllerName,
+    LaunchEnd,
+    SolverName,
+    TorqueConfig,
+    VelocityConfig,
+)
+from icub_jump_env.errors import ConfigError, UnknownFieldError
+from icub_jump_env.metrics.jump import SuccessConfig
+from icub_jump_env.planning.residual import ResidualConfig, ResidualPhases
+from icub_jump_env.planning.scaled_curve import (
     MAX_DISPLACEMENT,
     ComScaling,
     plan_com_trajectory,
 )
+from icub_jump_env.reward import RewardConfig
+from icub_jump_env.robot.robot import Robot, load_robot
+from icub_jump_env.robot.urdf import DEFAULT_MODEL
 from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig, ActuatorName
 from icub_jump_env.simulation.randomization import (
     RANDOMIZATIONS,
@@ -40,141 +55,196 @@ from icub_jump_env.simulation.sensor_models import (
 
 T = TypeVar("T")
 
-ControllerName = Literal["velocity", "torque"]
-ResidualPhases = Literal["launch", "all"]
 RenderMode = Literal["rgb_array", "human"]
-
-CONTROL_RATES: dict[ControllerName, float] = {"velocity": 200.0, "torque": 500.0}
-"""Default rate (Hz) of each controller."""
+CameraName = Literal["side", "front", "profile"]
 
 JUMP_HEIGHT_RANGE = (0.01, 0.15)
 DISPLACEMENT_RANGE = (0.03, MAX_DISPLACEMENT)
-RESIDUAL_RANGE = (0.0, 0.10)
 TIMESTEP_RANGE = (1e-5, 2e-3)
 AGENT_FREQUENCY_RANGE = (1.0, 1000.0)
-STAND_TIME_RANGE = (0.0, 30.0)
+
+
+@dataclass(frozen=True)
+class RenderConfig:
+    """Pictures.
+
+    Attributes:
+        mode: None, rgb_array or human.
+        width: Of a picture (pixels).
+        height: Of a picture (pixels).
+        camera: Where they are taken from.
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+
+    mode: RenderMode | None = None
+    width: int = 640
+    height: int = 480
+    camera: CameraName = "side"
+
+    def __post_init__(self) -> None:
+        check_choice("render_mode", self.mode, (None, *get_args(RenderMode)))
+        store(self, width=check_count("width", self.width, 16, 1920))
+        store(self, height=check_count("height", self.height, 16, 1080))
+        check_choice("camera", self.camera, get_args(CameraName))
+
+
+def _stands_for(*path: str) -> Any:
+    """A field of :class:`Shortcuts`; ``path`` leads to the field that it stands for."""
+    return field(default=None, metadata={"path": path})
+
+
+@dataclass(frozen=True)
+class Shortcuts:
+    """Fields inside the groups that ``gymnasium.make`` and ``eval.py`` take by themselves.
+
+    Attributes:
+        solver: QP solver.
+        constraints: Whether the CoM task and the momentum constraint are constraints, as
+            printed in the paper, or heavily weighted costs.
+        momentum_control: Pose the constraint on the angular momentum (eq. 3d, 6d).
+        control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
+            default 200 for the velocity controller and 500 for the torque controller.
+        launch_end: Whether the launch ends at T or at lift-off alone.
+        residual_scale: Largest offset of the CoM reference that an action can ask for:
+            forward, lateral, vertical (m).
+        residual_phases: Whether the residual acts in the launch alone or in all phases.
+        stand_time: How long the robot must stand after touch-down (s).
+        render_mode: None, rgb_array or human.
+        width: Of a picture (pixels).
+        height: Of a picture (pixels).
+        camera: Where pictures are taken from.
+    """
+
+    solver: SolverName | None = _stands_for("controller", "solver")
+    constraints: Constraints | None = _stands_for("controller", "constraints")
+    momentum_control: bool | None = _stands_for("controller", "momentum_control")
+    control_frequency: float | None = _stands_for("controller", "frequency")
+    launch_end: LaunchEnd | None = _stands_for("controller", "phases", "launch_end")
+    residual_scale: tuple[float, float, float] | None = _stands_for("residual", "scale")
+    residual_phases: ResidualPhases | None = _stands_for("residual", "phases")
+    stand_time: float | None = _stands_for("success", "stand_time")
+    render_mode: RenderMode | None = _stands_for("rendering", "mode")
+    width: int | None = _stands_for("rendering", "width")
+    height: int | None = _stands_for("rendering", "height")
+    camera: CameraName | None = _stands_for("rendering", "camera")
+
+
+_PATHS: Mapping[str, tuple[str, ...]] = {
+    field.name: field.metadata["path"] for field in dataclasses.fields(Shortcuts)
+}
 
 
 @dataclass(frozen=True)
 class JumpConfig:
-    """Everything ``gymnasium.make("ICubJump-v0", ...)`` takes.
+    """What ``gymnasium.make("ICubJump-v0", ...)`` takes, beside the :class:`Shortcuts`.
 
     Attributes:
-        controller: Controller of the launching phase.
+        robot: Model of the icub-models package.
+        ankle_shift: Move the ankle pitch range by -15 deg, as the paper did.
+        controller: Controller of the launching phase: a name, a ``VelocityConfig`` or a
+            ``TorqueConfig``.
         jump_height: Commanded rise of the CoM in flight (m); lowest and highest, if each
             episode draws its own.
         com_displacement: Rise of the CoM in the launching phase (m); by default the
             paper's 0.11 with scaling by displacement.
         com_scaling: What fixes the duration of the launch: the CoM displacement, or a
             final CoM acceleration of -9.81 m/s^2.
-        momentum_control: Pose the constraint on the angular momentum (eq. 3d).
-        solver: QP solver.
-        residual_scale: Largest offset of the CoM reference that an action can ask for:
-            forward, lateral, vertical (m).
-        residual_phases: When the residual acts: in the launch alone, where it moves the CoM
-            reference, or in all phases; in flight and landing it moves the posture, as far as
-            it takes to shift the CoM over resting feet.
-        timestep: Physics step (s).
-        control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
-            default 200 for the velocity controller and 500 for the torque controller.
+        residual: How actions move the reference.
         agent_frequency: Rate of ``env.step`` (Hz), a divisor of the control rate.
+        timestep: Physics step (s).
         actuators: Model of servos, low-level torque control and motors: a name or an
             ``ActuatorConfig``.
         sensors: Errors of the sensors: a name or a ``SensorConfig``.
         command_delay: Control ticks until a command takes effect (computation time).
         randomization: What varies from episode to episode: a name or a
             ``Randomization``.
-        stand_time: How long the robot must stand after touch-down (s).
-        ankle_shift: Move the ankle pitch range by -15 deg, as the paper did.
-        render_mode: None, rgb_array or human.
+        reward: Weights of the reward terms.
+        success: What counts as a successful jump.
+        rendering: Pictures.
 
     Raises:
         ConfigError: If a field is out of range, naming the field, the value and the
             allowed range.
     """
 
-    controller: ControllerName = "velocity"
+    robot: str = DEFAULT_MODEL
+    ankle_shift: bool = True
+    controller: ControllerName | VelocityConfig | TorqueConfig = "velocity"
     jump_height: float | tuple[float, float] = 0.04
     com_displacement: float | None = None
     com_scaling: ComScaling = "displacement"
-    momentum_control: bool = True
-    solver: SolverName = "daqp"
-    residual_scale: tuple[float, float, float] = (0.06, 0.02, 0.02)
-    residual_phases: ResidualPhases = "launch"
-    timestep: float = 0.001
-    control_frequency: float | None = None
+    residual: ResidualConfig = field(default_factory=ResidualConfig)
     agent_frequency: float = 100.0
+    timestep: float = 0.001
     actuators: ActuatorName | ActuatorConfig = "ideal"
     sensors: SensorName | SensorConfig = "ideal"
     command_delay: int = 0
     randomization: RandomizationName | Randomization = "none"
-    stand_time: float = 2.0
-    ankle_shift: bool = True
-    render_mode: RenderMode | None = None
+    reward: RewardConfig = field(default_factory=RewardConfig)
+    success: SuccessConfig = field(default_factory=SuccessConfig)
+    rendering: RenderConfig = field(default_factory=RenderConfig)
 
     def __post_init__(self) -> None:
-        check_choice("controller", self.controller, get_args(ControllerName))
+        store(self, ankle_shift=check_flag("ankle_shift", self.ankle_shift))
+        check_type("robot", self.robot, str)
+        load_robot(self.robot, self.ankle_shift)
         check_choice("com_scaling", self.com_scaling, get_args(ComScaling))
-        check_choice("residual_phases", self.residual_phases, get_args(ResidualPhases))
-        check_choice("solver", self.solver, get_args(SolverName))
-        check_choice("render_mode", self.render_mode, (None, *get_args(RenderMode)))
-        for field in ("momentum_control", "ankle_shift"):
-            self._store(field, check_flag(field, getattr(self, field)))
-        self._store("jump_height", _check_heights(self.jump_height))
+        store(self, jump_height=_check_heights(self.jump_height))
         if self.com_displacement is not None:
-            self._store(
-                "com_displacement",
-                check_number("com_displacement", self.com_displacement, *DISPLACEMENT_RANGE),
+            displacement = check_number(
+                "com_displacement", self.com_displacement, *DISPLACEMENT_RANGE
             )
-        self._store(
-            "residual_scale",
-            check_numbers("residual_scale", self.residual_scale, 3, *RESIDUAL_RANGE),
-        )
-        self._store("timestep", check_number("timestep", self.timestep, *TIMESTEP_RANGE))
-        self._store("stand_time", check_number("stand_time", self.stand_time, *STAND_TIME_RANGE))
-        self._check_models()
+            store(self, com_displacement=displacement)
+        store(self, timestep=check_number("timestep", self.timestep, *TIMESTEP_RANGE))
+        store(self, command_delay=check_count("command_delay", self.command_delay, 0, MAX_DELAY))
+        self._check_groups()
         self._check_rates()
         for height in self.jump_heights:
             plan_com_trajectory(height, self.com_displacement, self.com_scaling)
 
-    def _store(self, field: str, value: Any) -> None:
-        object.__setattr__(self, field, value)
-
-    def _check_models(self) -> None:
-        for field, names, kind in (
+    def _check_groups(self) -> None:
+        for name, presets, kind in (
+            ("controller", CONTROLLERS, ControllerConfig),
             ("actuators", ACTUATORS, ActuatorConfig),
             ("sensors", SENSORS, SensorConfig),
             ("randomization", RANDOMIZATIONS, Randomization),
         ):
-            value = getattr(self, field)
-            if isinstance(value, Mapping):
-                self._store(field, _from_mapping(field, value, kind))
-            elif not isinstance(value, kind):
-                check_choice(field, value, tuple(names))
-        self._store(
-            "command_delay", check_count("command_delay", self.command_delay, 0, MAX_DELAY)
-        )
+            value = self._from_mapping(name)
+            if not isinstance(value, kind):
+                check_choice(name, value, tuple(presets))
+        for name, preset in CONTROLLERS.items():
+            if self.controller == preset:
+                store(self, controller=name)
+        for name, kind in (
+            ("residual", ResidualConfig),
+            ("reward", RewardConfig),
+            ("success", SuccessConfig),
+            ("rendering", RenderConfig),
+        ):
+            check_type(name, self._from_mapping(name), kind)
+
+    def _from_mapping(self, name: str) -> Any:
+        """A group, made of the plain mapping that a file has in its place."""
+        value = getattr(self, name)
+        if isinstance(value, Mapping):
+            value = _nested(name, value, JumpConfig)
+            store(self, **{name: value})
+        return value
 
     def _check_rates(self) -> None:
-        physics = 1.0 / self.timestep
-        if self.control_frequency is not None:
-            frequency = check_number("control_frequency", self.control_frequency, 1.0, physics)
-            self._store("control_frequency", frequency)
-        control = self.control_rate
+        physics, control = 1.0 / self.timestep, self.controller_config.frequency
         if not is_multiple(physics, control):
-            if self.control_frequency is None:
-                raise ConfigError(
-                    "timestep", self.timestep, f"a fraction of the control period, 1/{control:g} s"
-                )
             raise ConfigError(
-                "control_frequency", control, f"a divisor of the physics rate of {physics:g} Hz"
+                "timestep", self.timestep, f"a fraction of the control period, 1/{control:g} s"
             )
         agent = check_number("agent_frequency", self.agent_frequency, *AGENT_FREQUENCY_RANGE)
         if not is_multiple(control, agent):
             raise ConfigError(
                 "agent_frequency", agent, f"a divisor of the control rate of {control:g} Hz"
             )
-        self._store("agent_frequency", agent)
+        store(self, agent_frequency=agent)
 
     @property
     def jump_heights(self) -> tuple[float, float]:
@@ -201,6 +271,22 @@ class JumpConfig:
         return rng.spawn(1)[0].uniform(*self.jump_height)
 
     @property
+    def robot_value(self) -> Robot:
+        """The robot."""
+        return load_robot(self.robot, self.ankle_shift)
+
+    @property
+    def controller_config(self) -> VelocityConfig | TorqueConfig:
+        """The controller, by name or as given."""
+        given = self.controller
+        return CONTROLLERS[given] if isinstance(given, str) else given
+
+    @property
+    def controller_name(self) -> ControllerName:
+        """Name of the controller."""
+        return self.controller_config.kind
+
+    @property
     def actuator_config(self) -> ActuatorConfig:
         """The actuator models, by name or as given."""
         return ACTUATORS[self.actuators] if isinstance(self.actuators, str) else self.actuators
@@ -217,16 +303,9 @@ class JumpConfig:
         return RANDOMIZATIONS[ranges] if isinstance(ranges, str) else ranges
 
     @property
-    def control_rate(self) -> float:
-        """Rate of the controller (Hz)."""
-        if self.control_frequency is None:
-            return CONTROL_RATES[self.controller]
-        return self.control_frequency
-
-    @property
     def control_dt(self) -> float:
         """Control period T_s (s)."""
-        return 1.0 / self.control_rate
+        return 1.0 / self.controller_config.frequency
 
     @property
     def physics_per_control(self) -> int:
@@ -236,20 +315,51 @@ class JumpConfig:
     @property
     def controls_per_step(self) -> int:
         """Control ticks per ``env.step``."""
-        return round(self.control_rate / self.agent_frequency)
+        return round(self.controller_config.frequency / self.agent_frequency)
 
     @classmethod
     def from_kwargs(cls, kwargs: Mapping[str, Any]) -> Self:
-        """Build from keywords, refusing unknown ones.
+        """Build from fields and shortcuts.
 
         Raises:
-            ConfigError: If a keyword is not a field, or a value is out of range.
+            UnknownFieldError: If a keyword is neither.
+            ConfigError: If a value is out of range.
         """
-        names = [field.name for field in dataclasses.fields(cls)]
-        for name, value in kwargs.items():
-            if name not in names:
-                raise ConfigError(name, value, f"no such field; the fields are {', '.join(names)}")
-        return cls(**kwargs)
+        return cls().replace(**kwargs)
+
+    def replace(self, **changes: Any) -> Self:
+        """The same with other fields or shortcuts.
+
+        Raises:
+            UnknownFieldError: If a keyword is neither.
+            ConfigError: If a value is out of range.
+        """
+        names = [field.name for field in dataclasses.fields(self)]
+        given: dict[tuple[str, ...], Any] = {}
+        for name in [name for name in changes if name not in names]:
+            if name not in _PATHS:
+                allowed = f"no such field; the fields are {', '.join([*names, *_PATHS])}"
+                raise UnknownFieldError(name, changes[name], allowed)
+            if changes[name] is not None:
+                given[_PATHS[name]] = changes[name]
+            del changes[name]
+        made = dataclasses.replace(self, **changes)
+        groups: dict[str, Any] = {}
+        for (group, *path), value in given.items():
+            default = made.controller_config if group == "controller" else getattr(made, group)
+            groups[group] = _set(groups.get(group, default), path, value)
+        return dataclasses.replace(made, **groups) if groups else made
+
+    def for_controller(self, name: ControllerName) -> Self:
+        """The same jump with the other controller at its own gains and rate."""
+        if name == self.controller_name:
+            return self
+        ours = self.controller_config
+        controller = dataclasses.replace(
+            CONTROLLERS[name],
+            **{field.name: getattr(ours, field.name) for field in _COMMON_FIELDS},
+        )
+        return dataclasses.replace(self, controller=controller)
 
     def with_options(self, options: Mapping[str, Any] | None) -> Self:
         """The configuration of one episode: ``reset(options={"jump_height": ...})``.
@@ -267,6 +377,19 @@ class JumpConfig:
         return dataclasses.replace(self, **options)
 
 
+_COMMON_FIELDS = [
+    field for field in dataclasses.fields(ControllerConfig) if field.name != "frequency"
+]
+
+
+def _set(group: Any, path: list[str], value: Any) -> Any:
+    """A group with another value at the end of the path into it."""
+    first, *rest = path
+    return dataclasses.replace(
+        group, **{first: _set(getattr(group, first), rest, value) if rest else value}
+    )
+
+
 def _check_heights(heights: Any) -> float | tuple[float, float]:
     if isinstance(heights, list | tuple | np.ndarray):
         return check_range("jump_height", heights, *JUMP_HEIGHT_RANGE)
@@ -274,22 +397,25 @@ def _check_heights(heights: Any) -> float | tuple[float, float]:
 
 
 def _from_mapping(name: str, values: Mapping[str, Any], kind: type[T]) -> T:
-    """A ``kind`` from a plain mapping, such as a configuration that was saved as JSON.
-
-    Fields that are dataclasses themselves are mappings, too; where there are several to
-    choose from, their ``kind`` says which.
-    """
+    """A ``kind`` from a plain mapping, such as a configuration that was saved as JSON."""
     hints = get_type_hints(kind)
-    made = {}
     for key, value in values.items():
         if key not in hints:
             allowed = f"no such field; the fields of {name} are {', '.join(hints)}"
-            raise ConfigError(str(key), value, allowed)
-        options = [t for t in (hints[key], *get_args(hints[key])) if dataclasses.is_dataclass(t)]
-        if options and isinstance(value, Mapping):
-            value = _from_mapping(key, value, _choose(key, value, options))
-        made[key] = value
-    return kind(**made)
+            raise UnknownFieldError(str(key), value, allowed)
+    return kind(**{key: _nested(key, value, kind) for key, value in values.items()})
+
+
+def _nested(name: str, value: Any, owner: type) -> Any:
+    """The field ``name`` of an ``owner``; where that is a dataclass, a mapping stands for it.
+
+    Where there are several dataclasses to choose from, its ``kind`` says which.
+    """
+    hint = get_type_hints(owner)[name]
+    options = [t for t in (hint, *get_args(hint)) if dataclasses.is_dataclass(t)]
+    if not options or not isinstance(value, Mapping):
+        return value
+    return _from_mapping(name, value, _choose(name, value, options))
 
 
 def _choose(name: str, values: Mapping[str, Any], options: list[Any]) -> Any:

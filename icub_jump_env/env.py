@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 from icub_jump_env import observation
 from icub_jump_env.checks import check_action, check_seed
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.control.jump import JumpController, LaunchController
+from icub_jump_env.control.jump import JumpController
 from icub_jump_env.control.phases import Phase
-from icub_jump_env.control.qp import IDLE, worse
-from icub_jump_env.control.torque import TorqueController
-from icub_jump_env.control.velocity import VelocityController
+from icub_jump_env.control.qp.problem import IDLE, worse
+from icub_jump_env.estimation.estimator import Estimator
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
+from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.metrics.jump import AIRBORNE_FORCE, JointLimits, JumpRecorder
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
+from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
 from icub_jump_env.reward import reward_terms
-from icub_jump_env.robot import facts
-from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.statics import holding_torque
@@ -84,7 +82,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ``solver_dual_residual``, ``solver_gap`` (of the step's worst control tick) and, from ``step``, the reward terms.
 
     ## Arguments
-    The fields of :class:`icub_jump_env.config.JumpConfig`. ``reset(options=
+    The fields of :class:`icub_jump_env.config.JumpConfig` and the
+    :class:`icub_jump_env.config.Shortcuts` for fields inside its groups. ``reset(options=
     {"jump_height": 0.05})`` overrides the command for one episode.
 
     ## Version history
@@ -100,47 +99,45 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Build the world and the controllers.
 
         Args:
-            config: Fields of :class:`JumpConfig`.
+            config: Fields of :class:`icub_jump_env.config.JumpConfig`, and
+                :class:`icub_jump_env.config.Shortcuts`.
 
         Raises:
-            ConfigError: If a field is unknown or out of range.
+            UnknownFieldError: If there is no such field; a ``TypeError``.
+            ConfigError: If a field is out of range.
         """
         self.config = JumpConfig.from_kwargs(config)
-        self.render_mode = self.config.render_mode
+        self.render_mode = self.config.rendering.mode
         self.metadata = {**self.metadata, "render_fps": round(self.config.agent_frequency)}
         limit = observation.OBSERVATION_LIMIT
         self.observation_space = spaces.Box(-limit, limit, (observation.SIZE,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
 
-        cfg = self.config
+        cfg, self.robot = self.config, self.config.robot_value
         self._simulation = Simulation(
-            Physics(cfg.timestep, cfg.ankle_shift, visuals=self.render_mode is not None),
+            Physics(self.robot, cfg.timestep, visuals=self.render_mode is not None),
             cfg.actuator_config,
             cfg.sensor_config,
             cfg.randomization_config,
             cfg.command_delay,
         )
-        self._estimator = FeetFixedEstimator(FeetFixedKinematics(cfg.ankle_shift))
-        limits = self._joint_limits()
-        self._recorder = JumpRecorder(limits, cfg.stand_time)
-        self._crouch = facts.crouch(cfg.ankle_shift)
-        crouch_q = self._estimator.kinematics.configuration(self._crouch)
+        kinematics = FeetFixedKinematics(self.robot)
+        self._estimator: Estimator = FeetFixedEstimator(kinematics)
+        self._recorder = JumpRecorder(self._joint_limits(), cfg.success.stand_time)
+        crouch_q = kinematics.configuration(self.robot.crouch)
         self._crouch_qpos = mujoco_qpos(crouch_q)
-        self._crouch_torque = holding_torque(crouch_q)
-        shift = None
-        if cfg.residual_phases == "all":
-            shift = self._estimator.kinematics.com_shift(facts.LANDING)
-        launch = self._make_launch(limits)
-        self._controller = JumpController(launch, self._crouch, cfg.control_dt, shift)
-        self._residual_scale = np.array(cfg.residual_scale)
+        self._crouch_torque = holding_torque(self.robot, crouch_q)
+        self._controller = JumpController(
+            cfg.controller_config, cfg.residual, kinematics, self._crouch_torque
+        )
+        self._residual_scale = np.array(cfg.residual.scale)
+        self._state: RobotState
         self._start_com = np.zeros(3)
         self._jump_height = math.nan
         self._outcome = "not reset"
         self._report = IDLE
         self._observation = np.zeros(observation.SIZE, np.float32)
-        self._renderer: Renderer | None = None
-        if self.render_mode is not None:
-            self._renderer = make_renderer(self._simulation.physics, self.render_mode)
+        self._renderer = self._make_renderer()
 
     @property
     def model(self) -> Any:
@@ -179,12 +176,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         trajectory = plan_com_trajectory(
             self._jump_height, episode.com_displacement, episode.com_scaling
         )
-        self._simulation.reset(
-            self.np_random, self._crouch_qpos, self._crouch_torque, trajectory.duration
-        )
+        ballistic = episode.controller_config.phases.launch_end == "lift_off"
+        plan = ScaledCurvePlan(trajectory, self.robot, ballistic)
+        simulation = self._simulation
+        simulation.reset(self.np_random, self._crouch_qpos, self._crouch_torque, plan.duration)
         self._sense()
-        self._start_com[:] = self._estimator.com
-        self._controller.reset(trajectory, self._start_com)
+        self._start_com[:] = self._state.com
+        self._controller.start(plan, self._state, simulation.physics.data.time)
         self._recorder.reset()
         self._outcome = "running"
         self._report = IDLE
@@ -199,13 +197,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Advance by ``dt``; less if the episode ends within.
 
         Args:
-            action: (3,) in [-1, 1].
+            action: (3,), clipped to [-1, 1].
 
         Returns:
             Observation, reward, terminated, truncated (always False) and info.
 
         Raises:
-            ActionError: If the action is misshapen, not finite or out of range.
+            ActionError: If the action is misshapen or not finite.
             gymnasium.error.ResetNeeded: Before the first reset.
         """
         if self._outcome == "not reset":
@@ -227,6 +225,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._jump_height,
             action64,
             ends=terminated and not already_over,
+            weights=self.config.reward,
         )
         if self.render_mode == "human":
             self.render()
@@ -243,10 +242,12 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def snapshot(self) -> Snapshot:
         """True state, reference and command at the present instant, for logs and figures."""
         truth, actuators = self._simulation.truth.read(), self._simulation.actuators
-        reference = self._controller.reference.position if self._launching else np.full(3, np.nan)
+        controller, reference = self._controller, np.full(3, np.nan)
+        if controller.launching:
+            reference = controller.reference.setpoint.com_position
         return Snapshot(
             time=truth.time,
-            phase=self._controller.phases.phase.name.lower(),
+            phase=controller.phases.phase.name.lower(),
             joint_position=truth.joint_position.copy(),
             joint_velocity=truth.joint_velocity.copy(),
             joint_velocity_command=actuators.velocity_command.copy(),
@@ -254,7 +255,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             joint_torque_command=actuators.torque_command.copy(),
             com=truth.com.copy(),
             com_velocity=truth.com_velocity.copy(),
-            com_estimate=self._estimator.com.copy(),
+            com_estimate=self._state.com.copy(),
             com_reference=reference.copy(),
             base_pitch=truth.base_pitch,
             ground_force=truth.ground_force,
@@ -272,28 +273,29 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._estimate()
-        if self.render_mode is not None:
-            self._renderer = make_renderer(self._simulation.physics, self.render_mode)
+        # The believed state is made of views of the model, which a copy fills anew.
+        self._state = self._estimator.estimate(self._simulation.sensors.readings)
+        self._renderer = self._make_renderer()
 
-    @property
-    def _launching(self) -> bool:
-        return self._controller.phases.phase is Phase.LAUNCH
+    def _make_renderer(self) -> Renderer | None:
+        rendering = self.config.rendering
+        if rendering.mode is None:
+            return None
+        return make_renderer(
+            self._simulation.physics,
+            rendering.mode,
+            rendering.width,
+            rendering.height,
+            rendering.camera,
+        )
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
         simulation = self._simulation
-        physics, sensors = simulation.physics, simulation.sensors
+        physics = simulation.physics
         if physics.diverged or not physics.valid:
             self._outcome = "diverged"
             return
-        tick = self._controller.tick(
-            physics.data.time,
-            self._estimator,
-            sensors.joint_position,
-            sensors.joint_velocity,
-            float(sensors.foot_force.sum()),
-            residual_target,
-        )
+        tick = self._controller.tick(self._state, physics.data.time, residual_target)
         if tick.report is not None:
             self._report = worse(self._report, tick.report)
             self._recorder.metrics.solver_failures += float(tick.report.failed)
@@ -310,13 +312,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._sense()
 
     def _sense(self) -> None:
-        """Take sensor readings and the estimates made of them, once per control tick."""
-        self._simulation.sense()
-        self._estimate()
-
-    def _estimate(self) -> None:
-        sensors = self._simulation.sensors
-        self._estimator.update(sensors.joint_position, sensors.joint_velocity)
+        """From readings to the believed state, once per control tick."""
+        self._state = self._estimator.estimate(self._simulation.sense())
 
     def _judge(self) -> str:
         truth = self._simulation.truth.state
@@ -325,7 +322,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._recorder.stood:
             return "stood"
         airborne = truth.ground_force < AIRBORNE_FORCE
-        deadline = self._controller.trajectory.duration + TAKEOFF_GRACE
+        deadline = self._controller.plan.duration + TAKEOFF_GRACE
         if (
             truth.time >= deadline
             and not airborne
@@ -334,51 +331,41 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             return "no take-off"
         return "running"
 
-    def _make_launch(self, limits: JointLimits) -> LaunchController:
-        cfg, crouch = self.config, self._crouch
-        positions = limits.lower_position, limits.upper_position
-        options = cfg.momentum_control, cfg.solver
-        if cfg.controller == "torque":
-            dynamics = FeetFixedDynamics(self._estimator.kinematics)
-            return TorqueController(crouch, self._crouch_torque, positions, dynamics, *options)
-        return VelocityController(crouch, positions, cfg.control_dt, *options)
-
     def _joint_limits(self) -> JointLimits:
-        lower, upper = self._simulation.physics.model.jnt_range[1:].T
-        return JointLimits(lower, upper, facts.VELOCITY_LIMIT, facts.EFFORT_LIMIT)
+        robot = self.robot
+        return JointLimits(
+            robot.lower_position, robot.upper_position, robot.velocity_limit, robot.effort_limit
+        )
 
     def _observe(self) -> None:
-        sensors, estimator, controller = (
-            self._simulation.sensors,
-            self._estimator,
-            self._controller,
-        )
-        phase, trajectory = controller.phases.phase, controller.trajectory
-        reference, time = controller.reference, self._simulation.physics.data.time
+        readings, state = self._simulation.sensors.readings, self._state
+        controller, episode_time = self._controller, self._simulation.physics.data.time
+        plan, residual = controller.plan, controller.residual
+        jump_time = controller.jump_time(episode_time)
         one_hot = np.zeros(len(Phase))
-        one_hot[phase] = 1.0
+        one_hot[controller.phases.phase] = 1.0
         com_error = np.zeros(3)
-        if self._launching:
-            reference.update(time)
-            com_error = estimator.com - reference.position
+        if controller.launching:
+            controller.reference.update(jump_time)
+            com_error = state.com - controller.reference.setpoint.com_position
         values = {
             "phase": one_hot,
-            "launch_progress": min(1.0, time / trajectory.duration),
-            "time": time,
+            "launch_progress": min(1.0, jump_time / plan.duration),
+            "time": episode_time,
             "jump_height": self._jump_height,
-            "com_displacement": trajectory.displacement,
-            "takeoff_time": trajectory.duration,
-            "joint_position": sensors.joint_position - self._crouch,
-            "joint_velocity": sensors.joint_velocity,
-            "gravity": sensors.gravity,
-            "gyro": sensors.gyro,
-            "com_offset": estimator.com - self._start_com,
-            "com_velocity": estimator.com_velocity,
-            "angular_momentum": estimator.angular_momentum,
+            "com_displacement": plan.displacement,
+            "takeoff_time": plan.duration,
+            "joint_position": readings.joint_position - self.robot.crouch,
+            "joint_velocity": readings.joint_velocity,
+            "gravity": readings.gravity,
+            "gyro": readings.gyro,
+            "com_offset": state.com - self._start_com,
+            "com_velocity": state.com_velocity,
+            "angular_momentum": state.angular_momentum,
             "com_error": com_error,
-            "residual_offset": reference.residual.offset,
-            "residual_velocity": reference.residual.velocity,
-            "foot_force": sensors.foot_force,
+            "residual_offset": residual.offset,
+            "residual_velocity": residual.velocity,
+            "foot_force": readings.foot_force,
         }
         self._observation = observation.encode(values)
 
@@ -386,7 +373,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         metrics, report = self._recorder.metrics, self._report
         return {
             "jump": metrics.as_dict(),
-            "is_success": metrics.is_success(self._jump_height),
+            "is_success": metrics.is_success(self._jump_height, self.config.success),
             "outcome": self._outcome,
             "diverged": self._outcome == "diverged",
             "phase": self._controller.phases.phase.name.lower(),

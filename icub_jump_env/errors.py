@@ -42,6 +42,10 @@ class ConfigError(InvalidValueError):
     """A configuration field or a reset option is unknown or out of range."""
 
 
+class UnknownFieldError(ConfigError, TypeError):
+    """There is no field of this name; a ``TypeError`` as any function's unknown keyword."""
+
+
 class ActionError(InvalidValueError):
     """An action has the wrong shape or type, or is not finite."""
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.robot.facts import JOINT_NAMES
+from icub_jump_env.robot.icub import JOINT_NAMES
 
 OBSERVATION_LIMIT = 10.0
 """Entries are clipped to plus or minus this, after scaling."""

@@ -1,1 +1,1 @@
-"""Controllers: QP, velocity (eq. 3) and torque controller (eq. 6), minimum jerk, phases of the jump."""
+"""Velocity (eq. 3) and torque controller (eq. 6), flight and landing, the phases of a jump."""

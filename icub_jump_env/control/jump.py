@@ -2,182 +2,111 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.command import JointCommand
-from icub_jump_env.control.minimum_jerk import MinimumJerk
-from icub_jump_env.control.phases import Phase, PhaseMachine
-from icub_jump_env.control.qp import QPReport
-from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
-from icub_jump_env.reference.com_reference import ComReference
-from icub_jump_env.reference.com_trajectory import PAPER_DISPLACEMENT, ComTrajectory
-from icub_jump_env.robot import facts
+from icub_jump_env.control.config import TorqueConfig, VelocityConfig
+from icub_jump_env.control.flight import MinimumJerkFlight
+from icub_jump_env.control.landing import HoldLanding
+from icub_jump_env.control.launch import Launch, TrackingController
+from icub_jump_env.control.phases import Phase, PhaseController, PhaseMachine, Tick
+from icub_jump_env.control.torque import TorqueController
+from icub_jump_env.control.velocity import VelocityController
+from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.planning.plan import JumpPlan
+from icub_jump_env.planning.reference import Reference
+from icub_jump_env.planning.residual import RESIDUAL_TIME, ResidualConfig, ResidualFilter
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float64]
-
-FLIGHT_MOTION_TIME = 0.12
-"""Duration of the minimum-jerk motion to the landing posture (s); a flight takes 0.19."""
-
-
-RESIDUAL_TIME = 0.7
-"""How long a residual acts after the launch, where it does (s): a flight takes 0.2 s, and
-after half a second on the ground most has happened."""
-
-
-def landing_posture(crouch: Array, displacement: float) -> Array:
-    """Landing posture for a launch of ``displacement`` (m), (23,) rad.
-
-    A short launch takes off from a deeper crouch, from where the legs have to be
-    retracted further to clear the ground.
-    """
-    share = min(1.0, displacement / PAPER_DISPLACEMENT)
-    return crouch + share * (facts.LANDING - crouch)
-
-
-class LaunchController(Protocol):
-    """Decides the joints in the launching phase.
-
-    Attributes:
-        report: How the latest tick's QP went.
-    """
-
-    report: QPReport
-
-    def reset(self) -> None:
-        """Forget everything about earlier ticks."""
-        ...
-
-    def command(
-        self,
-        estimator: FeetFixedEstimator,
-        joint_position: Array,
-        joint_velocity: Array,
-        reference: ComReference,
-    ) -> JointCommand:
-        """One control tick.
-
-        Args:
-            estimator: Estimates for the present encoder readings.
-            joint_position: (23,) encoder readings (rad).
-            joint_velocity: (23,) encoder readings (rad/s).
-            reference: CoM reference at the present time.
-
-        Returns:
-            The command until the next tick.
-        """
-        ...
-
-
-class Tick(NamedTuple):
-    """Outcome of one control tick.
-
-    Attributes:
-        command: Command to the joint servos.
-        report: How the QP went; ``None`` in phases without one.
-    """
-
-    command: JointCommand
-    report: QPReport | None
 
 
 class JumpController:
     """Launch on the QP, then minimum jerk to the landing posture, which is held.
 
+    The jump has a clock of its own: it starts when :meth:`start` is called.
+
     Attributes:
-        reference: The CoM reference of the launching phase.
+        reference: The set point of the launching phase.
+        residual: The shaped residual.
         phases: The phase machine.
-        trajectory: The planned CoM trajectory of this jump.
+        plan: The plan of this jump.
     """
 
     def __init__(
         self,
-        launch: LaunchController,
-        crouch: Array,
-        dt: float,
-        landing_shift: Array | None = None,
+        config: VelocityConfig | TorqueConfig,
+        residual: ResidualConfig,
+        kinematics: FeetFixedKinematics,
+        holding_torque: Array,
     ) -> None:
         """Set up the controller.
 
         Args:
-            launch: Controller of the launching phase.
-            crouch: (23,) posture the jump starts from (rad).
-            dt: Control period (s).
-            landing_shift: (23, 3) joint displacement (rad) per residual (m) in flight and
-                landing; by default the residual acts in the launching phase alone.
+            config: The controller of the launching phase, and when phases end.
+            residual: How actions move the set point.
+            kinematics: The model, which the estimator keeps up to date.
+            holding_torque: (n,) joint torques that hold the crouch (Nm).
         """
-        self._launch = launch
-        self._crouch = crouch
-        self._dt = dt
-        self._landing_shift = landing_shift
-        self.reference = ComReference()
-        self.phases = PhaseMachine()
-        self.trajectory: ComTrajectory
-        self._flight: MinimumJerk | None = None
-        self._flight_start = 0.0
+        dt = 1.0 / config.frequency
+        self.residual = ResidualFilter(residual.bandwidth)
+        self.reference = Reference(self.residual)
+        self.phases = PhaseMachine(config.phases)
+        self.plan: JumpPlan
+        self._began = 0.0
+        self._in_all_phases = residual.phases == "all"
+        shift = None
+        if self._in_all_phases:
+            shift = kinematics.com_shift(kinematics.robot.landing)
+        tracking: TrackingController
+        if isinstance(config, TorqueConfig):
+            tracking = TorqueController(config, kinematics, holding_torque)
+        else:
+            tracking = VelocityController(config, kinematics)
+        flight = MinimumJerkFlight(self.residual, dt, shift)
+        self._controllers: dict[Phase, PhaseController] = {
+            Phase.LAUNCH: Launch(tracking, self.reference, dt),
+            Phase.FLIGHT: flight,
+            Phase.LANDING: HoldLanding(flight),
+        }
 
-    def reset(self, trajectory: ComTrajectory, start_com: Array) -> None:
-        """Begin a jump.
-
-        Args:
-            trajectory: CoM trajectory of the launching phase.
-            start_com: (3,) estimated CoM at the start (m).
-        """
-        self.trajectory = trajectory
-        self.reference.reset(trajectory, start_com)
+    def start(self, plan: JumpPlan, state: RobotState, time: float) -> None:
+        """Begin a jump in ``state``, ``time`` (s) after the start of the episode."""
+        self.plan = plan
+        self._began = time
         self.phases.reset()
-        self._launch.reset()
-        self._flight = None
+        self._controllers[Phase.LAUNCH].start(state, plan, 0.0)
+
+    @property
+    def launching(self) -> bool:
+        """Whether the jump is in its launching phase."""
+        return self.phases.phase is Phase.LAUNCH
+
+    def jump_time(self, time: float) -> float:
+        """Time since the start of the jump (s), at ``time`` (s) of the episode."""
+        return time - self._began
 
     def residual_acts(self, time: float) -> bool:
-        """Whether a residual has an effect at ``time`` (s) since the start."""
-        if self._landing_shift is None:
-            return self.phases.phase is Phase.LAUNCH
-        return time < self.trajectory.duration + RESIDUAL_TIME
+        """Whether a residual has an effect at ``time`` (s) of the episode."""
+        if not self._in_all_phases:
+            return self.launching
+        return self.jump_time(time) < self.plan.duration + RESIDUAL_TIME
 
-    def tick(
-        self,
-        time: float,
-        estimator: FeetFixedEstimator,
-        joint_position: Array,
-        joint_velocity: Array,
-        normal_force: float,
-        residual_target: Array,
-    ) -> Tick:
+    def tick(self, state: RobotState, time: float, residual_target: Array) -> Tick:
         """One control tick.
 
         Args:
-            time: Time since the start of the launch (s).
-            estimator: Estimates for the present encoder readings.
-            joint_position: (23,) encoder readings (rad).
-            joint_velocity: (23,) encoder readings (rad/s).
-            normal_force: Total measured normal force under the feet (N).
-            residual_target: (3,) target offset of the CoM reference (m).
+            state: The believed state.
+            time: Time since the start of the episode (s).
+            residual_target: (3,) target offset of the residual (m).
 
         Returns:
             The command and how it came about.
         """
-        phase = self.phases.update(time, self.trajectory.duration, normal_force)
-        if phase is Phase.LAUNCH:
-            self.reference.update(time)
-            self.reference.residual.step(residual_target, self._dt)
-            command = self._launch.command(
-                estimator, joint_position, joint_velocity, self.reference
-            )
-            return Tick(command, self._launch.report)
-
-        if self._flight is None:
-            goal = landing_posture(self._crouch, self.trajectory.displacement)
-            self._flight = MinimumJerk(joint_position.copy(), goal, FLIGHT_MOTION_TIME)
-            self._flight_start = time
-            self.reference.residual.reset()
-        # An early touch-down does not stop the motion, so that chatter cannot either.
-        position, velocity = self._flight.sample(time - self._flight_start)
-        if self._landing_shift is not None:
-            residual = self.reference.residual
-            residual.step(residual_target, self._dt)
-            position = position + self._landing_shift @ residual.offset
-            velocity = velocity + self._landing_shift @ residual.velocity
-        return Tick(JointCommand(velocity, position), None)
+        time = self.jump_time(time)
+        before, duration = self.phases.phase, self.plan.duration
+        phase = self.phases.update(time, duration, float(state.foot_force.sum()))
+        controller = self._controllers[phase]
+        if phase is not before:
+            controller.start(state, self.plan, time)
+        return controller.tick(state, time, residual_target)

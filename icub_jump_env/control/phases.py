@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple, Protocol
 
-from icub_jump_env.checks import check_count, check_number
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.control.command import JointCommand
+from icub_jump_env.control.config import PhaseConfig
+from icub_jump_env.control.qp.problem import QPReport
+from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.planning.plan import JumpPlan
+
+Array = NDArray[np.float64]
 
 
 class Phase(IntEnum):
@@ -16,45 +25,50 @@ class Phase(IntEnum):
     LANDING = 2
 
 
-@dataclass(frozen=True)
-class ContactThresholds:
-    """When the feet count as lifted and as landed.
+class Tick(NamedTuple):
+    """Outcome of one control tick.
 
     Attributes:
-        lift_off: Total normal force (N) below which the feet may have lifted; 3 % of
-            the weight.
-        touch_down: Total normal force (N) above which an airborne robot has landed.
-        lift_off_ticks: Consecutive control ticks below ``lift_off`` that make a
-            lift-off; a single one is chatter.
-
-    Raises:
-        ConfigError: If a value is out of range.
+        command: Command to the joint servos.
+        report: How the QP went; ``None`` in phases without one.
     """
 
-    lift_off: float = 10.0
-    touch_down: float = 30.0
-    lift_off_ticks: int = 2
+    command: JointCommand
+    report: QPReport | None
 
-    def __post_init__(self) -> None:
-        check_number("lift_off", self.lift_off, 0.0, 1e4)
-        # Below the lift-off force, a robot about to take off would count as landed.
-        check_number("touch_down", self.touch_down, self.lift_off, 1e4)
-        check_count("lift_off_ticks", self.lift_off_ticks, 1)
+
+class PhaseController(Protocol):
+    """Decides the joints in one phase. Times are those since the start of the jump (s)."""
+
+    def start(self, state: RobotState, plan: JumpPlan, time: float) -> None:
+        """The phase begins."""
+        ...
+
+    def tick(self, state: RobotState, time: float, residual_target: Array) -> Tick:
+        """One control tick.
+
+        Args:
+            state: The believed state.
+            time: Time since the start of the jump (s).
+            residual_target: (3,) target offset of the residual (m).
+        """
+        ...
 
 
 class PhaseMachine:
     """Launch until T or lift-off, whichever is first; flight until the first contact.
 
-    Phases only move forward. When the launch ends by time the feet still carry load,
-    so that flight can end only after a lift-off was seen.
+    Or until lift-off alone, if so configured. Phases only move forward. When the launch
+    ends by time the feet still carry load, so that flight can end only after a lift-off
+    was seen.
 
     Attributes:
         phase: The current phase.
         airborne: Whether a lift-off has been detected.
     """
 
-    def __init__(self, thresholds: ContactThresholds | None = None) -> None:
-        self._thresholds = thresholds or ContactThresholds()
+    def __init__(self, config: PhaseConfig) -> None:
+        self._config = config
         self.reset()
 
     def reset(self) -> None:
@@ -68,19 +82,20 @@ class PhaseMachine:
 
         Args:
             time: Time since the start of the launch (s).
-            duration: Take-off time T of the reference (s).
+            duration: Take-off time T of the plan (s).
             normal_force: Total measured normal force under the feet (N).
 
         Returns:
             The phase from now on.
         """
-        thresholds = self._thresholds
+        config = self._config
         if not self.airborne:
-            unloaded = normal_force < thresholds.lift_off
+            unloaded = normal_force < config.lift_off
             self._unloaded_ticks = self._unloaded_ticks + 1 if unloaded else 0
-            self.airborne = self._unloaded_ticks >= thresholds.lift_off_ticks
-        if self.phase is Phase.LAUNCH and (self.airborne or time >= duration):
+            self.airborne = self._unloaded_ticks >= config.lift_off_ticks
+        over = self.airborne or (config.launch_end == "time" and time >= duration)
+        if self.phase is Phase.LAUNCH and over:
             self.phase = Phase.FLIGHT
-        elif self.phase is Phase.FLIGHT and self.airborne and normal_force > thresholds.touch_down:
+        elif self.phase is Phase.FLIGHT and self.airborne and normal_force > config.touch_down:
             self.phase = Phase.LANDING
         return self.phase

@@ -8,36 +8,44 @@ estimates (paper, Fig. 4).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from icub_jump_env.estimation.readings import Readings
+from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
-
-Array = NDArray[np.float64]
 
 
 class FeetFixedEstimator:
-    """Estimates that the controllers and the observation use, world frame.
-
-    Attributes:
-        kinematics: Feet-fixed kinematics at the latest joint positions.
-        com: (3,) CoM position x (m).
-        com_velocity: (3,) CoM velocity (m/s).
-        angular_momentum: (3,) centroidal angular momentum H_omega (kg m^2/s).
-    """
+    """The estimator of the paper's controllers."""
 
     def __init__(self, kinematics: FeetFixedKinematics) -> None:
-        self.kinematics = kinematics
-        self.com = np.zeros(3)
+        """Set up the estimator.
+
+        Args:
+            kinematics: The model that :meth:`estimate` keeps up to date.
+        """
+        self._kinematics = kinematics
         self._rates = np.zeros(6)
-        self.com_velocity, self.angular_momentum = self._rates[:3], self._rates[3:]
+        n = kinematics.robot.n_joints
+        self._state = RobotState(
+            joint_position=np.zeros(n),
+            joint_velocity=np.zeros(n),
+            base_rotation=kinematics.base_rotation,
+            com=kinematics.com,
+            com_velocity=self._rates[:3],
+            angular_momentum=self._rates[3:],
+            foot_force=np.zeros(2),
+        )
 
     def __reduce__(self) -> tuple[type[FeetFixedEstimator], tuple[FeetFixedKinematics]]:
-        # Every update overwrites all attributes, two of which are views.
-        return FeetFixedEstimator, (self.kinematics,)
+        # The state is made of views, which the next estimate fills.
+        return FeetFixedEstimator, (self._kinematics,)
 
-    def update(self, joint_position: Array, joint_velocity: Array) -> None:
-        """Take in encoder readings, (23,) rad and (23,) rad/s."""
-        kinematics = self.kinematics
-        kinematics.update(joint_position)
-        self.com[:] = kinematics.com
-        np.dot(kinematics.centroidal_map, joint_velocity, out=self._rates)
+    def estimate(self, readings: Readings) -> RobotState:
+        """The believed state; the next call overwrites it."""
+        kinematics, state = self._kinematics, self._state
+        kinematics.update(readings.joint_position)
+        np.dot(kinematics.centroidal_map, readings.joint_velocity, out=self._rates)
+        state.joint_position = readings.joint_position
+        state.joint_velocity = readings.joint_velocity
+        state.foot_force = readings.foot_force
+        return state

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from icub_jump_env.config import CONTROL_RATES, ControllerName, JumpConfig
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
-from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
+from icub_jump_env.planning.scaled_curve import ComTrajectory, plan_com_trajectory
 from icub_jump_env.robot import facts
 from icub_jump_env.snapshot import Snapshot
 

@@ -21,7 +21,7 @@ from icub_jump_env.evaluation.output import progress_display, save_figure, say, 
 from icub_jump_env.evaluation.provenance import command, provenance
 from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
 from icub_jump_env.evaluation.table import comparison_rows, render_table, verdict
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
+from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 
 
 @dataclass(frozen=True)

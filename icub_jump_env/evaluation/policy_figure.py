@@ -10,7 +10,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.figures import ACCENT, DESIRED, MEASURED
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.table import CM, DEG
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
+from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 
 _AFTER = 0.8
 """Shown after the commanded take-off (s)."""

@@ -12,7 +12,7 @@ from rich.table import Table
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.paper import PAPER
 from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
+from icub_jump_env.planning.scaled_curve import ComTrajectory, plan_com_trajectory
 
 
 @dataclass(frozen=True)

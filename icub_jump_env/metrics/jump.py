@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.checks import check_number, store
 from icub_jump_env.metrics.state import TrueState
-from icub_jump_env.robot.facts import GRAVITY, SPEED_TOLERANCE
+from icub_jump_env.robot.icub import GRAVITY, SPEED_TOLERANCE
 
 Array = NDArray[np.float64]
 
@@ -22,8 +23,29 @@ POSITION_TOLERANCE = 1e-3
 """... and its position limit beyond this (rad): MuJoCo's limits are slightly soft."""
 CHATTER_TIME = 0.02
 """A shorter loss of ground contact is no flight (s)."""
-MIN_FLIGHT_TIME = 0.1
-MIN_HEIGHT_RATIO = 0.7
+
+
+@dataclass(frozen=True)
+class SuccessConfig:
+    """What counts as a successful jump.
+
+    Attributes:
+        flight_time: Least time in the air (s).
+        height_ratio: Least CoM rise in flight, as a share of the commanded height.
+        stand_time: How long the robot must stand after touch-down (s).
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+
+    flight_time: float = 0.1
+    height_ratio: float = 0.7
+    stand_time: float = 2.0
+
+    def __post_init__(self) -> None:
+        store(self, flight_time=check_number("flight_time", self.flight_time, 0.0, 1.0))
+        store(self, height_ratio=check_number("height_ratio", self.height_ratio, 0.0, 2.0))
+        store(self, stand_time=check_number("stand_time", self.stand_time, 0.0, 30.0))
 
 
 class _Undefined(float):
@@ -107,12 +129,12 @@ class JumpMetrics:
     solver_failures: float = 0.0
     limit_violations: float = 0.0
 
-    def is_success(self, jump_height: float) -> bool:
-        """At least 0.1 s in the air, 70 % of the commanded height (m), and landed."""
+    def is_success(self, jump_height: float, success: SuccessConfig) -> bool:
+        """Whether the jump to a commanded height (m) landed, high and long enough."""
         return (
             self.landed
-            and self.flight_time >= MIN_FLIGHT_TIME
-            and self.flight_height >= MIN_HEIGHT_RATIO * jump_height
+            and self.flight_time >= success.flight_time
+            and self.flight_height >= success.height_ratio * jump_height
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -121,8 +143,20 @@ class JumpMetrics:
 
 
 @dataclass(slots=True)
-class _Flight:
-    """One spell in the air."""
+class Flight:
+    """One spell in the air, SI units.
+
+    Attributes:
+        time: Loss of ground contact (s).
+        height: CoM height then (m).
+        velocity: Vertical CoM velocity then (m/s).
+        momentum: Angular momentum about the CoM then, world axes (kg m^2/s).
+        duration: Time in the air (s); while it lasts, so far.
+        apex: Largest CoM height (m).
+        sole: Largest height of the lower sole's lowest corner (m).
+        rotation: Rotation of the equivalent rigid body about +y (rad).
+        pitch_low, pitch_high: Extremes of the base pitch (rad).
+    """
 
     time: float
     height: float
@@ -143,7 +177,8 @@ class JumpRecorder:
     so that neither chatter before take-off nor a bounce after landing is taken for it.
 
     Attributes:
-        metrics: The metrics so far.
+        metrics: The metrics so far; of the flights, those of the highest one.
+        flights: All flights of at least 20 ms so far, in time.
         touchdown_time: First contact after the apex (s); NaN before.
     """
 
@@ -166,7 +201,8 @@ class JumpRecorder:
         """Forget everything."""
         self.metrics = JumpMetrics()
         self.touchdown_time = math.nan
-        self._flight: _Flight | None = None
+        self.flights: list[Flight] = []
+        self._flight: Flight | None = None
         self._best_apex = -math.inf
         self._last_time: float | None = None
         self._only_feet = True
@@ -224,7 +260,7 @@ class JumpRecorder:
             or (state.joint_position > self._upper).any()
         )
 
-    def _fly(self, flight: _Flight, state: TrueState, dt: float) -> None:
+    def _fly(self, flight: Flight, state: TrueState, dt: float) -> None:
         locked_velocity = np.linalg.solve(state.locked_inertia, state.angular_momentum)
         flight.rotation += float(locked_velocity[1]) * dt
         flight.duration = state.time - flight.time
@@ -232,12 +268,16 @@ class JumpRecorder:
         flight.sole = max(flight.sole, state.sole_height)
         flight.pitch_low = min(flight.pitch_low, state.base_pitch)
         flight.pitch_high = max(flight.pitch_high, state.base_pitch)
-        if flight.duration >= CHATTER_TIME and flight.apex >= self._best_apex:
+        if flight.duration < CHATTER_TIME:
+            return
+        if not self.flights or self.flights[-1] is not flight:
+            self.flights.append(flight)
+        if flight.apex >= self._best_apex:
             self._best_apex = flight.apex
             self.touchdown_time = math.nan
             self._publish(flight)
 
-    def _publish(self, flight: _Flight) -> None:
+    def _publish(self, flight: Flight) -> None:
         metrics = self.metrics
         metrics.takeoff_time = flight.time
         metrics.takeoff_velocity = flight.velocity
@@ -251,18 +291,19 @@ class JumpRecorder:
         metrics.angular_momentum_takeoff = flight.momentum
         metrics.landing_force = UNDEFINED
 
-    def _touch_down(self, flight: _Flight, time: float) -> None:
+    def _touch_down(self, flight: Flight, time: float) -> None:
         if flight.duration >= CHATTER_TIME and flight.apex >= self._best_apex:
-            self.metrics.flight_time = time - flight.time
+            flight.duration = time - flight.time
+            self.metrics.flight_time = flight.duration
             self.metrics.landing_force = 0.0
             self.touchdown_time = time
         self._footholds = None
         self._flight = None
 
 
-def _take_off(state: TrueState) -> _Flight:
+def _take_off(state: TrueState) -> Flight:
     x, y, z = (float(h) for h in state.angular_momentum)
-    return _Flight(
+    return Flight(
         time=state.time,
         height=float(state.com[2]),
         velocity=float(state.com_velocity[2]),

@@ -1,1 +1,1 @@
-"""The iCub: facts, URDF, MuJoCo and Pinocchio models, kinematics of standing."""
+"""The robot as a value, its URDF, MuJoCo and Pinocchio models, kinematics of standing."""

@@ -3,7 +3,7 @@
 With the left foot at rest the base acceleration follows from the joints, which leaves
 
     base rows:   B_s s_ddot - X f = b                 (6)
-    joint rows:  tau = T_s s_ddot - L f + t           (23)
+    joint rows:  tau = T_s s_ddot - L f + t           (n)
 
 of the equations of motion (eq. 1), where f = (f_left, f_right) are the contact wrenches
 (force, moment) in the sole frames. All other quantities are in the axes of the base.
@@ -18,12 +18,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.icub import GRAVITY as STANDARD_GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float64]
 
-GRAVITY = np.array([0.0, 0.0, -facts.GRAVITY])
+GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 """Acceleration of gravity, world (m/s^2)."""
 
 
@@ -57,10 +57,10 @@ class FeetFixedDynamics:
 
     Attributes:
         mass: Total mass (kg).
-        base_rows: (6, 35) of (s_ddot, f).
+        base_rows: (6, n + 12) of (s_ddot, f).
         base_bias: (6,) b; the base rows of eq. 1 are ``base_rows @ x = base_bias``.
-        torque_rows: (23, 35) of (s_ddot, f).
-        torque_bias: (23,) t; joint torques are ``torque_rows @ x + torque_bias`` (Nm).
+        torque_rows: (n, n + 12) of (s_ddot, f).
+        torque_bias: (n,) t; joint torques are ``torque_rows @ x + torque_bias`` (Nm).
         foot_bias: (6,) acceleration that the feet would gain relative to each other at
             s_ddot = 0; both stay at rest (eq. 6c) where ``J_feet s_ddot = foot_bias``.
         force_rows: (3, 12) total contact force of f, base axes.
@@ -69,10 +69,12 @@ class FeetFixedDynamics:
 
     def __init__(self, kinematics: FeetFixedKinematics) -> None:
         self._kinematics = kinematics
+        robot = kinematics.robot
+        self._left_leg = robot.left_leg
         model = kinematics.model.copy()
         data = model.createData()
         self._model, self._data = model, data
-        n = facts.N_JOINTS
+        n = robot.n_joints
         self.mass = kinematics.mass
         self.base_rows = np.zeros((6, n + 12))
         self.base_bias = np.zeros(6)
@@ -90,12 +92,13 @@ class FeetFixedDynamics:
         self._h_base, self._h_joints = data.nle[:6], data.nle[6:]
         self._M_base, self._M_coupling = data.M[:6, :6], data.M[:6, 6:]
         self._M_joints = data.M[6:, 6:]
-        self._feet = [self._foot(side, frame) for side, frame in enumerate(facts.SOLE_FRAMES)]
+        self._feet = [self._foot(side, frame) for side, frame in enumerate(robot.sole_frames)]
 
     def _foot(self, side: int, frame_name: str) -> _Foot:
         frame = self._model.frames[self._model.getFrameId(frame_name)]
-        first = facts.N_JOINTS + 6 * side
-        columns, leg = slice(first, first + 6), (facts.LEFT_LEG, facts.RIGHT_LEG)[side]
+        robot = self._kinematics.robot
+        first = robot.n_joints + 6 * side
+        columns, leg = slice(first, first + 6), (robot.left_leg, robot.right_leg)[side]
         return _Foot(
             placement=self._kinematics.data.oMi[frame.parentJoint],
             drift=self._data.a_gf[frame.parentJoint],
@@ -113,8 +116,8 @@ class FeetFixedDynamics:
         """Recompute all attributes.
 
         Args:
-            joint_position: (23,) rad; the kinematics must be updated for it already.
-            joint_velocity: (23,) rad/s.
+            joint_position: (n,) rad; the kinematics must be updated for it already.
+            joint_velocity: (n,) rad/s.
         """
         model, kinematics = self._model, self._kinematics
         J_left = kinematics.J_left
@@ -123,7 +126,7 @@ class FeetFixedDynamics:
         np.dot(GRAVITY, kinematics.base_rotation, out=gravity[:3])
         model.gravity.linear = gravity[:3]
         self._q[7:] = joint_position
-        np.dot(J_left, joint_velocity[facts.LEFT_LEG], out=self._v[:6])
+        np.dot(J_left, joint_velocity[self._left_leg], out=self._v[:6])
         np.negative(self._v[:6], out=self._v[:6])
         self._v[6:] = joint_velocity
         pin.nonLinearEffects(model, self._data, self._q, self._v)
@@ -138,12 +141,13 @@ class FeetFixedDynamics:
             np.negative(foot.J.T.dot(foot.wrench), out=foot.torque_rows)
         np.subtract(drifts[1], drifts[0], out=self.foot_bias)
 
-        n, coupling = facts.N_JOINTS, self._M_coupling
+        coupling = self._M_coupling
+        n = len(self.torque_bias)
         self.base_rows[:, :n] = coupling
-        self.base_rows[:, facts.LEFT_LEG] -= self._M_base.dot(J_left)
+        self.base_rows[:, self._left_leg] -= self._M_base.dot(J_left)
         np.subtract(self._M_base.dot(drifts[0]), self._h_base, out=self.base_bias)
         self.torque_rows[:, :n] = self._M_joints
-        self.torque_rows[:, facts.LEFT_LEG] -= coupling.T.dot(J_left)
+        self.torque_rows[:, self._left_leg] -= coupling.T.dot(J_left)
         np.subtract(self._h_joints, drifts[0].dot(coupling), out=self.torque_bias)
         self.torque_bias += self._damping * joint_velocity
 

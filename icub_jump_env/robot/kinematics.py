@@ -16,49 +16,46 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from icub_jump_env.robot import facts
-from icub_jump_env.robot.urdf import load_urdf
+from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
 
 @functools.cache
-def _cached_model(ankle_shift: bool) -> Any:
-    model = pin.buildModelFromXML(load_urdf(ankle_shift), pin.JointModelFreeFlyer())
-    model.armature[6:] = facts.ARMATURE
+def _cached_model(robot: Robot) -> Any:
+    model = pin.buildModelFromXML(robot.urdf(), pin.JointModelFreeFlyer())
+    model.armature[6:] = robot.armature
     return model
 
 
-def build_pinocchio_model(ankle_shift: bool = True) -> Any:
+def build_pinocchio_model(robot: Robot) -> Any:
     """The floating-base Pinocchio model, with rotor inertias.
 
-    Configuration: base position (m, world), base quaternion xyzw, 23 joints (rad).
-    Velocity: linear and angular base velocity in the base frame, 23 joints (rad/s).
-
-    Args:
-        ankle_shift: Move the ankle pitch range by -15 deg, as the paper did.
+    Configuration: base position (m, world), base quaternion xyzw, n joints (rad).
+    Velocity: linear and angular base velocity in the base frame, n joints (rad/s).
 
     Returns:
         A ``pinocchio.Model`` of its own, free to be changed by the caller.
     """
-    return pin.Model(_cached_model(ankle_shift))
+    return pin.Model(_cached_model(robot))
 
 
 class FeetFixedKinematics:
     """CoM and centroidal momentum as functions of the joints, feet fixed to the floor.
 
-    Call :meth:`update` once per control tick, then read the attributes. They are
-    buffers that the next update overwrites. World frame: origin on the floor below
-    the middle of the sole frames, +x where the robot faces, +z up.
+    An estimator calls :meth:`update` once per control tick; the attributes are buffers
+    that the next update overwrites. World frame: origin on the floor below the middle of the sole frames, +x
+    where the robot faces, +z up.
 
     Attributes:
+        robot: The robot; n is the number of its joints.
         mass: Total mass (kg).
         com: (3,) CoM position W_p_CoM (m).
-        centroidal_map: (6, 23) J_com above J_momentum.
-        J_com: (3, 23) maps joint velocities to the CoM velocity (m/s), world axes.
-        J_momentum: (3, 23) maps joint velocities to the centroidal angular momentum
+        centroidal_map: (6, n) J_com above J_momentum.
+        J_com: (3, n) maps joint velocities to the CoM velocity (m/s), world axes.
+        J_momentum: (3, n) maps joint velocities to the centroidal angular momentum
             H_omega (kg m^2/s), world axes; the angular half of J_M in eq. 2.
-        J_feet: (6, 23) maps joint velocities to the twist of the right foot relative
+        J_feet: (6, n) maps joint velocities to the twist of the right foot relative
             to the left one. Both feet are at rest (eq. 3c) where it vanishes.
         base_rotation: (3, 3) orientation of ``root_link`` in the world.
         base_position: (3,) position of ``root_link`` in the world (m).
@@ -69,17 +66,18 @@ class FeetFixedKinematics:
         world_M_ankle: ``pinocchio.SE3`` of the left ankle roll joint, which stands still.
     """
 
-    def __init__(self, ankle_shift: bool = True) -> None:
-        self._ankle_shift = ankle_shift
-        self.model = _cached_model(ankle_shift)
+    def __init__(self, robot: Robot) -> None:
+        n = robot.n_joints
+        self.robot = robot
+        self.model = _cached_model(robot)
         self.data = self.model.createData()
         self._q = pin.neutral(self.model)
         self.mass = float(pin.computeTotalMass(self.model))
         self._inverse_mass = 1.0 / self.mass
         self.com = np.zeros(3)
-        self.centroidal_map = np.zeros((6, facts.N_JOINTS))
+        self.centroidal_map = np.zeros((6, n))
         self.J_com, self.J_momentum = self.centroidal_map[:3], self.centroidal_map[3:]
-        self.J_feet = np.zeros((6, facts.N_JOINTS))
+        self.J_feet = np.zeros((6, n))
         self.base_rotation = np.eye(3)
         self.base_position = np.zeros(3)
 
@@ -93,12 +91,14 @@ class FeetFixedKinematics:
         self.base_p_com = data.com[0]
         placement = data.oMi[ankle]
         self._ankle_R_base, self._base_p_ankle = placement.rotation.T, placement.translation
-        self._joint_map = np.zeros((6, facts.N_JOINTS))
-        self._joint_map_left = self._joint_map[:, facts.LEFT_LEG]
+        self._joint_map = np.zeros((6, n))
+        self._joint_map_left = self._joint_map[:, robot.left_leg]
+        self._J_feet_left = self.J_feet[:, robot.left_leg]
+        self._J_feet_right = self.J_feet[:, robot.right_leg]
 
-    def __reduce__(self) -> tuple[type[FeetFixedKinematics], tuple[bool]]:
+    def __reduce__(self) -> tuple[type[FeetFixedKinematics], tuple[Robot]]:
         # The buffers are views of Pinocchio's; a copy takes its own at its next update.
-        return FeetFixedKinematics, (self._ankle_shift,)
+        return FeetFixedKinematics, (self.robot,)
 
     def _place_left_ankle(self) -> int:
         """Fix the left sole flat on the floor, half the stance width left of the x axis.
@@ -107,15 +107,15 @@ class FeetFixedKinematics:
         """
         model, data = self.model, self.data
         pin.framesForwardKinematics(model, data, self._q)
-        left, right = (model.getFrameId(name) for name in facts.SOLE_FRAMES)
+        left, right = (model.getFrameId(name) for name in self.robot.sole_frames)
         stance_width = abs(data.oMf[left].actInv(data.oMf[right]).translation[1])
-        sole_position = np.array([0.0, stance_width / 2, -facts.SOLE.bottom])
+        sole_position = np.array([0.0, stance_width / 2, -self.robot.sole.bottom])
         frame = model.frames[left]
         self.world_M_ankle = pin.SE3(np.eye(3), sole_position) * frame.placement.inverse()
         return int(frame.parentJoint)
 
     def configuration(self, posture: Array) -> Array:
-        """Pinocchio's configuration (30,) of a posture (23,) (rad) with the soles on the floor."""
+        """Pinocchio's configuration (n + 7,) of a posture (n,) (rad), soles on the floor."""
         self.update(posture)
         quaternion = Rotation.from_matrix(self.base_rotation).as_quat()
         return np.concatenate((self.base_position, quaternion, posture))
@@ -124,10 +124,10 @@ class FeetFixedKinematics:
         """How the joints shift the CoM with both feet at rest, to first order.
 
         Args:
-            posture: (23,) joint positions (rad).
+            posture: (n,) joint positions (rad).
 
         Returns:
-            (23, 3): the shortest displacement of the joints (rad) per shift of the CoM
+            (n, 3): the shortest displacement of the joints (rad) per shift of the CoM
             (m) in the world.
         """
         self.update(posture)
@@ -138,14 +138,14 @@ class FeetFixedKinematics:
         """Recompute all attributes.
 
         Args:
-            joint_position: (23,) joint positions (rad).
+            joint_position: (n,) joint positions (rad).
         """
         # With the base at the origin, its columns of J are the identity, so that the
         # base twist for a left foot at rest is minus the left leg's contribution.
         self._q[7:] = joint_position
         pin.computeCentroidalMap(self.model, self.data, self._q)
-        self.J_feet[:, facts.LEFT_LEG] = self.J_left
-        np.negative(self.J_right, out=self.J_feet[:, facts.RIGHT_LEG])
+        self._J_feet_left[:] = self.J_left
+        np.negative(self.J_right, out=self._J_feet_right)
 
         R = np.dot(self._world_R_ankle, self._ankle_R_base, out=self.base_rotation)
         np.subtract(self._world_p_ankle, R.dot(self._base_p_ankle), out=self.base_position)

@@ -9,13 +9,22 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.robot import facts
-from icub_jump_env.robot.urdf import load_urdf, mesh_root
+from icub_jump_env.robot.icub import BASE_YAW, FEET_FRICTION
+from icub_jump_env.robot.robot import Robot
+from icub_jump_env.robot.urdf import mesh_root
 
 FLOOR_GEOM = "floor"
 CAMERA = "side"
+"""The default one."""
 COLLISION_GROUP = 3
 VISUAL_GROUP = 2
+
+_CAMERAS = {
+    CAMERA: ((1.15, -1.55, 0.72), (0.05, 0.0, 0.47)),
+    "front": ((1.95, 0.0, 0.60), (0.0, 0.0, 0.47)),
+    "profile": ((0.0, -1.95, 0.60), (0.0, 0.0, 0.47)),
+}
+"""Position and target (m) by name."""
 
 _FLOOR_COLORS = ((0.86, 0.87, 0.89), (0.78, 0.80, 0.83))
 _BOX_COLOR = (0.45, 0.55, 0.7, 1.0)
@@ -26,9 +35,7 @@ def sole_geom(side: str) -> str:
     return f"{side}_sole_contact"
 
 
-def build_model(
-    timestep: float, ankle_shift: bool = True, visuals: bool = False
-) -> mujoco.MjModel:
+def build_model(robot: Robot, timestep: float, visuals: bool = False) -> mujoco.MjModel:
     """Compile the iCub with a free base, one motor per joint, on a flat floor.
 
     Links keep their URDF names; body 1 is the base with the free joint. Each joint
@@ -36,8 +43,8 @@ def build_model(
     joint torques (Nm) in joint order, clamped at the effort limits.
 
     Args:
+        robot: The robot.
         timestep: Physics step (s).
-        ankle_shift: Move the ankle pitch range by -15 deg, as the paper did.
         visuals: Load the iCub's meshes. They have no effect on the dynamics.
 
     Returns:
@@ -46,9 +53,9 @@ def build_model(
     # Without these settings MuJoCo merges welded links and drops visual meshes and their folders.
     compiler = (
         '<mujoco><compiler fusestatic="false" discardvisual="false" strippath="false" '
-        f"meshdir={quoteattr(str(mesh_root()))}/></mujoco>"
+        f"meshdir={quoteattr(str(mesh_root(robot.name)))}/></mujoco>"
     )
-    urdf = load_urdf(ankle_shift, visuals).replace("</robot>", f"{compiler}</robot>")
+    urdf = robot.urdf(visuals).replace("</robot>", f"{compiler}</robot>")
     spec = mujoco.MjSpec.from_string(urdf)
     spec.option.timestep = timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -59,15 +66,15 @@ def build_model(
         geom.contype = 0
         geom.conaffinity = 0
         geom.group = VISUAL_GROUP
-    spec.body(facts.BASE_LINK).add_freejoint(name="base")
-    _add_contact_geometry(spec)
-    _add_motors(spec)
-    _add_sensors(spec)
+    spec.body(robot.base_link).add_freejoint(name="base")
+    _add_contact_geometry(spec, robot)
+    _add_motors(spec, robot)
+    _add_sensors(spec, robot)
     _add_scenery(spec)
     return spec.compile()
 
 
-def _add_contact_geometry(spec: mujoco.MjSpec) -> None:
+def _add_contact_geometry(spec: mujoco.MjSpec, robot: Robot) -> None:
     # The robot's geoms collide with the floor only, not with each other.
     spec.worldbody.add_geom(
         name=FLOOR_GEOM,
@@ -75,12 +82,12 @@ def _add_contact_geometry(spec: mujoco.MjSpec) -> None:
         size=[0.0, 0.0, 0.5],
         contype=1,
         conaffinity=0,
-        friction=[facts.FEET_FRICTION, 0.005, 0.0001],
+        friction=[FEET_FRICTION, 0.005, 0.0001],
         material="floor",
     )
-    sole = facts.SOLE
+    sole = robot.sole
     half_thickness = 0.004
-    for side, frame in zip("lr", facts.SOLE_FRAMES, strict=True):
+    for side, frame in zip("lr", robot.sole_frames, strict=True):
         spec.body(frame).add_geom(
             name=sole_geom(side),
             type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -89,11 +96,11 @@ def _add_contact_geometry(spec: mujoco.MjSpec) -> None:
             contype=0,
             conaffinity=1,
             mass=0.0,
-            friction=[facts.FEET_FRICTION, 0.005, 0.0001],
+            friction=[FEET_FRICTION, 0.005, 0.0001],
             group=COLLISION_GROUP,
             rgba=_BOX_COLOR,
         )
-    for link, (center, half_size) in facts.BODY_BOXES.items():
+    for link, (center, half_size) in robot.body_boxes.items():
         spec.body(link).add_geom(
             name=f"{link}_contact",
             type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -107,22 +114,24 @@ def _add_contact_geometry(spec: mujoco.MjSpec) -> None:
         )
 
 
-def _add_motors(spec: mujoco.MjSpec) -> None:
-    for name, motor in zip(facts.JOINT_NAMES, facts.MOTORS, strict=True):
-        spec.joint(name).armature = motor.armature
+def _add_motors(spec: mujoco.MjSpec, robot: Robot) -> None:
+    for name, armature, effort in zip(
+        robot.joint_names, robot.armature, robot.effort_limit, strict=True
+    ):
+        spec.joint(name).armature = armature
         actuator = spec.add_actuator(
             name=name,
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
             target=name,
             ctrllimited=True,
-            ctrlrange=[-motor.effort, motor.effort],
+            ctrlrange=[-effort, effort],
             forcelimited=True,
-            forcerange=[-motor.effort, motor.effort],
+            forcerange=[-effort, effort],
         )
         actuator.set_to_motor()
 
 
-def _add_sensors(spec: mujoco.MjSpec) -> None:
+def _add_sensors(spec: mujoco.MjSpec, robot: Robot) -> None:
     body = mujoco.mjtObj.mjOBJ_BODY
     sensor = mujoco.mjtSensor
     for name, kind in (
@@ -130,12 +139,12 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
         ("com_velocity", sensor.mjSENS_SUBTREELINVEL),
         ("angular_momentum", sensor.mjSENS_SUBTREEANGMOM),
     ):
-        spec.add_sensor(name=name, type=kind, objtype=body, objname=facts.BASE_LINK)
+        spec.add_sensor(name=name, type=kind, objtype=body, objname=robot.base_link)
     for quantity, kind in (
         ("position", sensor.mjSENS_JOINTPOS),
         ("velocity", sensor.mjSENS_JOINTVEL),
     ):
-        for joint in facts.JOINT_NAMES:
+        for joint in robot.joint_names:
             spec.add_sensor(
                 name=f"{joint}_{quantity}",
                 type=kind,
@@ -143,8 +152,8 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
                 objname=joint,
             )
     # The base faces its own -x; the IMU frame is turned to face forward.
-    half_yaw = facts.BASE_YAW / 2
-    spec.body(facts.BASE_LINK).add_site(
+    half_yaw = BASE_YAW / 2
+    spec.body(robot.base_link).add_site(
         name="imu", quat=[math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw)]
     )
     spec.add_sensor(
@@ -204,10 +213,10 @@ def _add_scenery(spec: mujoco.MjSpec) -> None:
         light = spec.worldbody.add_light(pos=[0.0, 0.0, 3.0], dir=direction, castshadow=False)
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         light.diffuse = [0.5, 0.5, 0.5]
-    position, target = np.array([1.15, -1.55, 0.72]), np.array([0.05, 0.0, 0.47])
-    camera = spec.worldbody.add_camera(name=CAMERA, pos=position, fovy=38.0)
-    camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
-    camera.alt.xyaxes = _camera_axes(target - position)
+    for name, (position, target) in _CAMERAS.items():
+        camera = spec.worldbody.add_camera(name=name, pos=position, fovy=38.0)
+        camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
+        camera.alt.xyaxes = _camera_axes(np.subtract(target, position))
 
 
 def _camera_axes(view: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
-
 import numpy as np
 
 from icub_jump_env.metrics.state import TrueState
-from icub_jump_env.robot import facts
 from icub_jump_env.robot.mujoco_model import sole_geom
 from icub_jump_env.simulation.physics import Physics
 
@@ -26,22 +23,22 @@ class GroundTruth:
 
     def __init__(self, physics: Physics) -> None:
         self._physics = physics
-        model, data = physics.model, physics.data
+        robot, model, data = physics.robot, physics.model, physics.data
         self.state = TrueState(
             com=data.sensor("com").data,
             com_velocity=data.sensor("com_velocity").data,
             angular_momentum=data.sensor("angular_momentum").data,
-            joint_position=data.sensordata[_span(model, "position")],
-            joint_velocity=data.sensordata[_span(model, "velocity")],
+            joint_position=data.sensordata[_span(physics, "position")],
+            joint_velocity=data.sensordata[_span(physics, "velocity")],
             joint_torque=data.actuator_force,
             # The chest's up axis is the y axis of its link frame.
-            chest_up=data.xmat[model.body(facts.CHEST_LINK).id].reshape(3, 3)[:, 1],
+            chest_up=data.xmat[model.body(robot.chest_link).id].reshape(3, 3)[:, 1],
         )
         self._floor = data.sensor("floor_force").data
         self._soles_touching = [data.sensor(f"{side}_sole_force").data for side in "lr"]
         # Body 1 heads the kinematic tree: its composite inertia is about the CoM.
         self._composite_inertia = data.crb[1]
-        self._base_rotation = data.xmat[model.body(facts.BASE_LINK).id]
+        self._base_rotation = data.xmat[model.body(robot.base_link).id]
         left, right = (model.geom(sole_geom(side)).id for side in "lr")
         self._soles = [
             (data.geom_xpos[geom], data.geom_xmat[geom], model.geom_size[geom])
@@ -68,10 +65,11 @@ class GroundTruth:
         return state
 
 
-def _span(model: Any, quantity: str) -> slice:
+def _span(physics: Physics, quantity: str) -> slice:
     """Where the sensors of all joints stand in ``sensordata``."""
-    start = model.sensor(f"{facts.JOINT_NAMES[0]}_{quantity}").adr[0]
-    return slice(start, start + facts.N_JOINTS)
+    robot = physics.robot
+    start = physics.model.sensor(f"{robot.joint_names[0]}_{quantity}").adr[0]
+    return slice(start, start + robot.n_joints)
 
 
 def _lowest_corner(position: np.ndarray, rotation: np.ndarray, half_size: np.ndarray) -> float:

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.robot import facts
 from icub_jump_env.robot.mujoco_model import build_model
+from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -25,16 +25,18 @@ class Physics:
     ``data.qfrc_applied`` and as a push on the chest through ``data.xfrc_applied``.
 
     Attributes:
+        robot: The robot.
         model: The MuJoCo model.
         data: The MuJoCo data.
-        joint_position: (23,) live view of the joint positions (rad).
-        joint_velocity: (23,) live view of the joint velocities (rad/s).
+        joint_position: (n,) live view of the joint positions (rad).
+        joint_velocity: (n,) live view of the joint velocities (rad/s).
         evaluated_time: Time (s) for which MuJoCo last evaluated forces, sensors and all
             that depends on the state: the beginning of the last step.
     """
 
-    def __init__(self, timestep: float, ankle_shift: bool = True, visuals: bool = False) -> None:
-        self.model = build_model(timestep, ankle_shift, visuals)
+    def __init__(self, robot: Robot, timestep: float, visuals: bool = False) -> None:
+        self.robot = robot
+        self.model = build_model(robot, timestep, visuals)
         self.data = mujoco.MjData(self.model)
         self._bind()
 
@@ -44,7 +46,7 @@ class Physics:
         self.joint_velocity = data.qvel[6:]
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self._joint_force = data.qfrc_applied[6:]
-        self._chest_force = data.xfrc_applied[self.model.body(facts.CHEST_LINK).id]
+        self._chest_force = data.xfrc_applied[self.model.body(self.robot.chest_link).id]
         self._warnings = data.warning.number
         self._last_time = data.time
         self.evaluated_time = data.time
@@ -52,6 +54,7 @@ class Physics:
     def __getstate__(self) -> dict[str, Any]:
         # The rest are views, which a copy must take anew of its own data.
         return {
+            "robot": self.robot,
             "model": self.model,
             "data": self.data,
             "last_time": self._last_time,
@@ -59,13 +62,13 @@ class Physics:
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.model, self.data = state["model"], state["data"]
+        self.robot, self.model, self.data = state["robot"], state["model"], state["data"]
         self._bind()
         self._last_time = state["last_time"]
         self.evaluated_time = state["evaluated_time"]
 
     def reset(self, qpos: Array) -> None:
-        """Put the robot at rest at MuJoCo positions ``qpos``, (30,)."""
+        """Put the robot at rest at MuJoCo positions ``qpos``, (n + 7,)."""
         mujoco.mj_resetData(self.model, self.data)
         self._qpos[:] = qpos
         mujoco.mj_forward(self.model, self.data)
@@ -81,9 +84,9 @@ class Physics:
         """Advance by one physics step.
 
         Args:
-            torque: (23,) motor torques on the joint side (Nm), which MuJoCo clamps at the
+            torque: (n,) motor torques on the joint side (Nm), which MuJoCo clamps at the
                 effort limits.
-            friction: (23,) torques that joint friction takes away from them (Nm).
+            friction: (n,) torques that joint friction takes away from them (Nm).
             push: Force on the chest's CoM along +x (N).
         """
         self._ctrl[:] = torque

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_range, store
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.icub import FEET_FRICTION
+from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -74,7 +75,7 @@ class Randomization:
     link_mass: Range = (1.0, 1.0)
     payload_mass: Range = (0.0, 0.0)
     payload_offset: Range = (0.0, 0.0)
-    friction: Range = (facts.FEET_FRICTION, facts.FEET_FRICTION)
+    friction: Range = (FEET_FRICTION, FEET_FRICTION)
     strength: Range = (1.0, 1.0)
     delay: Range = (0, 0)
     joint_gain: Range = (1.0, 1.0)
@@ -136,15 +137,7 @@ RANDOMIZATIONS: Mapping[RandomizationName, Randomization] = MappingProxyType(
         ),
     }
 )
-"""Ranges by name: ``mild`` is half of ``full``; ``hard`` adds what only feedback can handle."""
-
-BIASED_JOINTS = tuple(
-    facts.JOINT_INDEX[f"{side}_{joint}"]
-    for side in "lr"
-    for joint in ("hip_pitch", "knee", "ankle_pitch")
-)
-"""The joints whose encoders ``encoder_bias`` falsifies."""
-
+"""Ranges by name: ``mild`` is half of ``full``; ``hard`` adds slope, encoder bias and pushes."""
 
 @dataclass(frozen=True, eq=False)
 class World:
@@ -155,13 +148,13 @@ class World:
         payload_mass: kg.
         payload_offset: (3,) m, chest axes.
         friction: Coulomb friction of the contact.
-        strength: (23,) share per joint.
+        strength: (n,) share per joint.
         delay: Control ticks.
-        joint_gain: (23,) factor per joint.
-        damping: (23,) factor per joint.
+        joint_gain: (n,) factor per joint.
+        damping: (n,) factor per joint.
         sensor_noise: Factor.
         slope: rad.
-        encoder_bias: (23,) rad; zero where encoders are right.
+        encoder_bias: (n,) rad; zero where encoders are right.
         push: N s.
         push_time: When the push begins, as a share of the launch in which it fits.
     """
@@ -189,7 +182,9 @@ class World:
         }
 
 
-def draw_world(ranges: Randomization, n_links: int, rng: np.random.Generator) -> World:
+def draw_world(
+    ranges: Randomization, robot: Robot, n_links: int, rng: np.random.Generator
+) -> World:
     """Draw the world of one episode.
 
     Always consumes the same number of random numbers, so that a seed means the same
@@ -202,13 +197,14 @@ def draw_world(ranges: Randomization, n_links: int, rng: np.random.Generator) ->
         values: Array = low + rng.random(size) * (high - low)
         return values
 
-    n = facts.N_JOINTS
+    n = robot.n_joints
     link_mass = uniform(ranges.link_mass, n_links)
     strength = uniform(ranges.strength, n)
     joint_gain = uniform(ranges.joint_gain, n)
     damping = uniform(ranges.damping, n)
     encoder_bias = np.zeros(n)
-    encoder_bias[list(BIASED_JOINTS)] = uniform(ranges.encoder_bias, len(BIASED_JOINTS))
+    biased = robot.leg_pitch_joints
+    encoder_bias[biased] = uniform(ranges.encoder_bias, len(biased))
     height, turn = uniform((-1.0, 1.0), 1)[0], uniform((0.0, 2 * math.pi), 1)[0]
     radius = math.sqrt(1.0 - height**2)
     direction = np.array([radius * math.cos(turn), radius * math.sin(turn), height])

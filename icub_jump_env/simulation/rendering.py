@@ -14,7 +14,6 @@ from icub_jump_env.robot.mujoco_model import CAMERA
 from icub_jump_env.simulation.opengl import has_display, open_context
 from icub_jump_env.simulation.physics import Physics
 
-HEIGHT, WIDTH = 480, 640
 MAX_GEOMS = 1000
 
 
@@ -30,26 +29,39 @@ class Renderer(Protocol):
         ...
 
 
-def make_renderer(physics: Physics, mode: str) -> Renderer:
+def make_renderer(
+    physics: Physics, mode: str, width: int, height: int, camera: str
+) -> Renderer:
     """A renderer for ``rgb_array`` or ``human``.
+
+    Args:
+        physics: What it shows.
+        mode: ``rgb_array`` or ``human``.
+        width: Of a picture (pixels).
+        height: Of a picture (pixels).
+        camera: Name of the camera of a picture.
 
     Raises:
         MissingDependencyError: If there is no OpenGL, or no display for a window.
     """
-    return WindowRenderer(physics) if mode == "human" else PictureRenderer(physics)
+    if mode == "human":
+        return WindowRenderer(physics)
+    return PictureRenderer(physics, width, height, camera)
 
 
 class PictureRenderer:
     """Renders off screen; opens its graphics context with the first picture."""
 
-    def __init__(self, physics: Physics, height: int = HEIGHT, width: int = WIDTH) -> None:
+    def __init__(
+        self, physics: Physics, width: int = 640, height: int = 480, camera: str = CAMERA
+    ) -> None:
         self._model, self._data = physics.model, physics.data
         self._viewport = mujoco.MjrRect(0, 0, width, height)
         self._scene = mujoco.MjvScene(self._model, MAX_GEOMS)
         self._options = mujoco.MjvOption()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
-        self._camera.fixedcamid = self._model.camera(CAMERA).id
+        self._camera.fixedcamid = self._model.camera(camera).id
         self._opengl: Any = None
         self._graphics: Any = None
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.robot import facts
+from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.robot.mujoco_model import sole_geom
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import World
@@ -23,36 +23,20 @@ from icub_jump_env.simulation.sensor_models import (
 
 Array = NDArray[np.float64]
 
-_CHANNELS = {
-    "joint_position": facts.N_JOINTS,
-    "joint_velocity": facts.N_JOINTS,
-    "tilt": 3,
-    "gyro": 3,
-    "force": 6,
-    "moment": 6,
-}
-
-
 _VIEWS = ("_imu_rotation", "_imu_gyro", "_sole_forces", "_soles")
 
 
 class Sensors:
-    """Latest readings, refreshed by :meth:`read`.
+    """Takes :class:`Readings` of a physics, with their errors.
 
     Encoders show the present state; IMU and feet the beginning of the last physics step,
     when MuJoCo evaluated them.
 
-    The IMU frame sits on ``root_link`` and faces forward: x forward, y left, z up.
-
     Attributes:
-        joint_position: (23,) encoders (rad).
-        joint_velocity: (23,) encoders (rad/s).
-        gravity: (3,) direction of gravity in the IMU frame, unit vector.
-        gyro: (3,) angular velocity of the base in the IMU frame (rad/s).
-        foot_force: (2,) normal force under the left and right sole (N).
-        encoder_bias: (23,) constant part of the encoders' error (rad).
+        readings: The latest readings, which :meth:`read` overwrites.
+        encoder_bias: (n,) constant part of the encoders' error (rad).
         biased: Whether any of it is not zero.
-        torque_error: (23,) what the errors of the feet's force/torque sensors do to the
+        torque_error: (n,) what the errors of the feet's force/torque sensors do to the
             joint torques computed from them (Nm): J^T times the wrench's error.
     """
 
@@ -61,10 +45,16 @@ class Sensors:
         self._physics = physics
         self._config = config
         self._bind()
-        n = facts.N_JOINTS
-        self.joint_position, self.joint_velocity = np.zeros(n), np.zeros(n)
-        self.gravity, self.gyro = np.zeros(3), np.zeros(3)
-        self.foot_force = np.zeros(2)
+        n = physics.robot.n_joints
+        self._channels = {
+            "joint_position": n,
+            "joint_velocity": n,
+            "tilt": 3,
+            "gyro": 3,
+            "force": 6,
+            "moment": 6,
+        }
+        self.readings = Readings.of(n)
         self.encoder_bias, self.torque_error = np.zeros(n), np.zeros(n)
         self.biased = False
         self._world_bias = np.zeros(n)
@@ -97,7 +87,7 @@ class Sensors:
         # A generator for each, so that the errors of one kind do not depend on another's.
         self._errors = {
             kind: ErrorSource(
-                getattr(config, kind), _CHANNELS[kind], np.random.default_rng([seed, index])
+                getattr(config, kind), self._channels[kind], np.random.default_rng([seed, index])
             )
             for index, kind in enumerate(ERROR_KINDS)
             if getattr(config, kind) != SensorError()
@@ -127,48 +117,50 @@ class Sensors:
             },
         }
 
-    def read(self) -> None:
+    def read(self) -> Readings:
         """Take new readings."""
-        self.joint_position[:] = self._physics.joint_position
-        self.joint_position += self._world_bias
-        self.joint_velocity[:] = self._physics.joint_velocity
-        np.dot(self._down, self._imu_rotation, out=self.gravity)
-        self.gyro[:] = self._imu_gyro
+        readings = self.readings
+        readings.joint_position[:] = self._physics.joint_position
+        readings.joint_position += self._world_bias
+        readings.joint_velocity[:] = self._physics.joint_velocity
+        np.dot(self._down, self._imu_rotation, out=readings.gravity)
+        readings.gyro[:] = self._imu_gyro
         for foot, force in enumerate(self._sole_forces):
-            self.foot_force[foot] = force[3]
+            readings.foot_force[foot] = force[3]
         if self._errors or self._wrong_forces:
-            self._falsify()
+            self._falsify(readings)
         if self._config.delay:
-            self._postpone()
+            self._postpone(readings)
+        return readings
 
-    def _falsify(self) -> None:
+    def _falsify(self, readings: Readings) -> None:
         time = self._physics.data.time
         error = {kind: source.at(time) for kind, source in self._errors.items()}
-        self.joint_position += error.get("joint_position", 0.0)
-        self.joint_velocity += error.get("joint_velocity", 0.0)
-        self.gyro += error.get("gyro", 0.0)
+        readings.joint_position += error.get("joint_position", 0.0)
+        readings.joint_velocity += error.get("joint_velocity", 0.0)
+        readings.gyro += error.get("gyro", 0.0)
         if "tilt" in error:
-            self.gravity += _cross(error["tilt"], self.gravity)
-            self.gravity /= np.linalg.norm(self.gravity)
+            readings.gravity += _cross(error["tilt"], readings.gravity)
+            readings.gravity /= np.linalg.norm(readings.gravity)
         if self._wrong_forces:
             forces = error.get("force", np.zeros(6)).reshape(2, 3)
             moments = error.get("moment", np.zeros(6)).reshape(2, 3)
-            self._falsify_forces(forces, moments)
+            self._falsify_forces(readings, forces, moments)
 
-    def _falsify_forces(self, force_errors: Array, moment_errors: Array) -> None:
+    def _falsify_forces(
+        self, readings: Readings, force_errors: Array, moment_errors: Array
+    ) -> None:
         model, data = self._physics.model, self._physics.data
         self.torque_error[:] = 0.0
         for foot, (center, body) in enumerate(self._soles):
             force = force_errors[foot] + self._force_gain[foot] * self._sole_forces[foot][1:4]
-            self.foot_force[foot] += force[2]
+            readings.foot_force[foot] += force[2]
             mujoco.mj_jac(model, data, self._jacobian[:3], self._jacobian[3:], center, body)
             wrench = np.concatenate((force, moment_errors[foot]))
             self.torque_error -= self._jacobian[:, 6:].T @ wrench
 
-    def _postpone(self) -> None:
-        present = (
-            self.joint_position, self.joint_velocity, self.gravity, self.gyro, self.foot_force
-        )  # fmt: skip
+    def _postpone(self, readings: Readings) -> None:
+        present = [getattr(readings, name) for name in Readings.__slots__]
         self._history.append(tuple(reading.copy() for reading in present))
         for reading, past in zip(present, self._history[0], strict=True):
             reading[:] = past

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.control.command import JointCommand
+from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.simulation.actuators.actuators import Actuators
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.ground_truth import GroundTruth
@@ -60,9 +61,10 @@ class Simulation:
         self.sensors = Sensors(physics, sensors)
         self._actuator_config = actuators
         self._dt = float(physics.model.opt.timestep)
-        self.actuators = Actuators(actuators, self._dt)
+        nominal = np.ones(physics.robot.n_joints)
+        self.actuators = Actuators(actuators, physics.robot, self._dt, nominal, nominal)
         self._randomization = randomization
-        self._variation = ModelVariation(physics.model)
+        self._variation = ModelVariation(physics.model, physics.robot)
         self._command_delay = command_delay
         self._pending: deque[JointCommand] = deque()
         self._push = _NO_PUSH
@@ -79,16 +81,17 @@ class Simulation:
 
         Args:
             rng: Where all randomness comes from.
-            qpos: (30,) MuJoCo positions to start from.
-            torque: (23,) joint torques that hold them (Nm).
+            qpos: (n + 7,) MuJoCo positions to start from.
+            torque: (n,) joint torques that hold them (Nm).
             launch_duration: In which the push has to fit (s).
         """
         physics = self.physics
-        self.world = world = draw_world(self._randomization, physics.model.nbody - 1, rng)
+        robot, n_links = physics.robot, physics.model.nbody - 1
+        self.world = world = draw_world(self._randomization, robot, n_links, rng)
         if self._randomization.varies:
             self._variation.apply(world, physics.model)
             self.actuators = Actuators(
-                self._actuator_config, self._dt, world.strength, world.joint_gain
+                self._actuator_config, robot, self._dt, world.strength, world.joint_gain
             )
         self.sensors.reset(world, seed=int(rng.integers(2**63)))
         physics.reset(qpos)
@@ -128,10 +131,11 @@ class Simulation:
         pushing = start <= physics.data.time < end
         physics.step(torque, actuators.friction, force if pushing else 0.0)
 
-    def sense(self) -> None:
+    def sense(self) -> Readings:
         """Take new readings; call once per control tick."""
-        self.sensors.read()
+        readings = self.sensors.read()
         self.actuators.torque_error[:] = self.sensors.torque_error
+        return readings
 
 
 _NO_PUSH = (np.inf, np.inf, 0.0)

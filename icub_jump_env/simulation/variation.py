@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.mujoco_model import FLOOR_GEOM, sole_geom
+from icub_jump_env.robot.robot import Robot
 from icub_jump_env.simulation.randomization import World
 
 Array = NDArray[np.float64]
@@ -23,7 +24,8 @@ _VARIED = (
 class ModelVariation:
     """Keeps the nominal values of a model, to which every world is applied afresh."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, robot: Robot) -> None:
+        self._chest = model.body(robot.chest_link).id
         self._nominal = {name: getattr(model, name).copy() for name in _VARIED}
 
     def apply(self, world: World, model: mujoco.MjModel) -> None:
@@ -32,17 +34,15 @@ class ModelVariation:
             getattr(model, name)[:] = values
         model.body_mass[1:] *= world.link_mass
         model.body_inertia[1:] *= world.link_mass[:, None]
-        _add_point_mass(
-            model, model.body(facts.CHEST_LINK).id, world.payload_mass, world.payload_offset
-        )
+        _add_point_mass(model, self._chest, world.payload_mass, world.payload_offset)
         model.dof_damping[6:] *= world.damping
         # A contact takes the larger friction of its two geoms: both get the same.
         for geom in (FLOOR_GEOM, *(sole_geom(side) for side in "lr")):
             model.geom_friction[model.geom(geom).id, 0] = world.friction
         model.opt.gravity[:] = (
-            -facts.GRAVITY * math.sin(world.slope),
+            -GRAVITY * math.sin(world.slope),
             0.0,
-            -facts.GRAVITY * math.cos(world.slope),
+            -GRAVITY * math.cos(world.slope),
         )
         # Subtree masses and the like follow from the above. The scratch data keeps the
         # simulation's own from being moved to the reference configuration.

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_choice, check_number, store
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.icub import SPEED_TOLERANCE
+from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ class Motor(Protocol):
     """Limits torques to what the motors can give."""
 
     def limit(self, torque: Array, joint_velocity: Array) -> None:
-        """Clip (23,) joint-side motor torques (Nm) in place, at (23,) rad/s."""
+        """Clip (n,) joint-side motor torques (Nm) in place, at (n,) rad/s."""
         ...
 
 
@@ -35,20 +36,20 @@ class RatedMotor:
         ConfigError: If a value is out of range.
     """
 
-    speed_band: float = facts.SPEED_TOLERANCE
+    speed_band: float = SPEED_TOLERANCE
     kind: Literal["rated"] = "rated"
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("rated",))
         store(self, speed_band=check_number("speed_band", self.speed_band, 1e-3, 1.0))
 
-    def make(self, strength: Array) -> Motor:
-        """The motors; ``strength`` is the (23,) share of their largest torque that they reach."""
-        slope = 1.0 / (self.speed_band * facts.VELOCITY_LIMIT)
+    def make(self, robot: Robot, strength: Array) -> Motor:
+        """The motors; ``strength`` is the (n,) share of their largest torque that they reach."""
+        slope = 1.0 / (self.speed_band * robot.velocity_limit)
         return _TorqueSpeedLine(
-            effort=facts.EFFORT_LIMIT * strength,
-            stall=facts.EFFORT_LIMIT * strength * (1.0 + 1.0 / self.speed_band),
-            droop=facts.EFFORT_LIMIT * strength * slope,
+            effort=robot.effort_limit * strength,
+            stall=robot.effort_limit * strength * (1.0 + 1.0 / self.speed_band),
+            droop=robot.effort_limit * strength * slope,
         )
 
 
@@ -87,14 +88,14 @@ class DCMotor:
         store(self, stall_torque=check_number("stall_torque", self.stall_torque, 1.0, 100.0))
         store(self, no_load_speed=check_number("no_load_speed", self.no_load_speed, 0.1, 10.0))
 
-    def make(self, strength: Array) -> Motor:
-        """The motors; ``strength`` is the (23,) share of their largest torque that they reach."""
-        effort = facts.EFFORT_LIMIT * strength
+    def make(self, robot: Robot, strength: Array) -> Motor:
+        """The motors; ``strength`` is the (n,) share of their largest torque that they reach."""
+        effort = robot.effort_limit * strength
         stall = self.stall_torque * effort
         return _TorqueSpeedLine(
             effort=self.current_limit * effort,
             stall=self.voltage_limit * stall,
-            droop=stall / (self.no_load_speed * facts.VELOCITY_LIMIT),
+            droop=stall / (self.no_load_speed * robot.velocity_limit),
         )
 
 

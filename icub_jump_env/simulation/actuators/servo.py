@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_number, store
-from icub_jump_env.robot import facts
 
 Array = NDArray[np.float64]
 
@@ -42,27 +41,28 @@ class JointServo:
     that it does not wind up. Runs at each physics step.
     """
 
-    def __init__(self, dt: float, gains: ServoGains, scale: Array) -> None:
+    def __init__(self, dt: float, gains: ServoGains, scale: Array, effort_limit: Array) -> None:
         """Set up the servo.
 
         Args:
             dt: Physics step (s).
             gains: Nominal gains.
-            scale: (23,) factor on the gains of each joint.
+            scale: (n,) factor on the gains of each joint.
+            effort_limit: (n,) largest torques (Nm).
         """
         self._dt = dt
         self._stiffness = gains.stiffness * scale
         self._damping = gains.damping * scale
-        self._largest_error = facts.EFFORT_LIMIT / self._stiffness
-        self._reference = np.zeros(facts.N_JOINTS)
-        self._torque = np.zeros(facts.N_JOINTS)
+        self._largest_error = effort_limit / self._stiffness
+        self._reference = np.zeros_like(effort_limit)
+        self._torque = np.zeros_like(effort_limit)
 
     def reset(self, joint_position: Array, torque: Array) -> None:
-        """Hold ``joint_position`` ((23,) rad) with ``torque`` ((23,) Nm)."""
+        """Hold ``joint_position`` ((n,) rad) with ``torque`` ((n,) Nm)."""
         self._reference[:] = joint_position + torque / self._stiffness
 
     def move_to(self, position: Array) -> None:
-        """Set the position ((23,) rad) that moves on with the commanded velocity."""
+        """Set the position ((n,) rad) that moves on with the commanded velocity."""
         self._reference[:] = position
 
     def torque(
@@ -71,12 +71,12 @@ class JointServo:
         """Advance by one physics step.
 
         Args:
-            velocity_command: (23,) rad/s.
-            joint_position: (23,) encoders (rad).
-            joint_velocity: (23,) encoders (rad/s).
+            velocity_command: (n,) rad/s.
+            joint_position: (n,) encoders (rad).
+            joint_velocity: (n,) encoders (rad/s).
 
         Returns:
-            (23,) torques (Nm), not limited; a buffer that the next call overwrites.
+            (n,) torques (Nm), not limited; a buffer that the next call overwrites.
         """
         reference, torque = self._reference, self._torque
         reference += velocity_command * self._dt

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_choice, check_number, store
-from icub_jump_env.robot import facts
 
 Array = NDArray[np.float64]
 
@@ -20,19 +19,19 @@ class TorqueLoop(Protocol):
     """Low-level torque controllers of all joints."""
 
     def reset(self, torque: Array) -> None:
-        """Start from (23,) joint torques (Nm) in balance."""
+        """Start from (n,) joint torques (Nm) in balance."""
         ...
 
     def motor_torque(self, desired: Array, measured: Array, friction: Array) -> Array:
         """Advance by one physics step.
 
         Args:
-            desired: (23,) joint torques asked for (Nm).
-            measured: (23,) joint torques measured (Nm); the loop may keep the array.
-            friction: (23,) joint friction (Nm), for loops that compensate it by model.
+            desired: (n,) joint torques asked for (Nm).
+            measured: (n,) joint torques measured (Nm); the loop may keep the array.
+            friction: (n,) joint friction (Nm), for loops that compensate it by model.
 
         Returns:
-            (23,) motor torques on the joint side (Nm); a buffer which the caller clips in
+            (n,) motor torques on the joint side (Nm); a buffer which the caller clips in
             place, so that a loop with a state cannot wind up.
         """
         ...
@@ -47,9 +46,9 @@ class IdealTorque:
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("ideal",))
 
-    def make(self, dt: float) -> TorqueLoop:
-        """The loop at a physics step of ``dt`` (s)."""
-        return _Ideal()
+    def make(self, dt: float, n_joints: int) -> TorqueLoop:
+        """The loops of ``n_joints`` joints at a physics step of ``dt`` (s)."""
+        return _Ideal(n_joints)
 
 
 @dataclass(frozen=True)
@@ -79,9 +78,9 @@ class TorqueFeedback:
         store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1000.0))
         store(self, delay=check_number("delay", self.delay, 0.0, 0.1))
 
-    def make(self, dt: float) -> TorqueLoop:
-        """The loop at a physics step of ``dt`` (s)."""
-        return _Feedback(self, dt)
+    def make(self, dt: float, n_joints: int) -> TorqueLoop:
+        """The loops of ``n_joints`` joints at a physics step of ``dt`` (s)."""
+        return _Feedback(self, dt, n_joints)
 
 
 @dataclass(frozen=True)
@@ -121,14 +120,14 @@ class CurrentControl:
             self, torque_constant=check_number("torque_constant", self.torque_constant, 0.5, 1.5)
         )
 
-    def make(self, dt: float) -> TorqueLoop:
-        """The loop at a physics step of ``dt`` (s)."""
-        return _Current(self, dt)
+    def make(self, dt: float, n_joints: int) -> TorqueLoop:
+        """The loops of ``n_joints`` joints at a physics step of ``dt`` (s)."""
+        return _Current(self, dt, n_joints)
 
 
 class _Ideal:
-    def __init__(self) -> None:
-        self._torque = np.zeros(facts.N_JOINTS)
+    def __init__(self, n_joints: int) -> None:
+        self._torque = np.zeros(n_joints)
 
     def reset(self, torque: Array) -> None:
         self._torque[:] = torque
@@ -139,9 +138,9 @@ class _Ideal:
 
 
 class _Feedback:
-    def __init__(self, config: TorqueFeedback, dt: float) -> None:
+    def __init__(self, config: TorqueFeedback, dt: float, n_joints: int) -> None:
         self._gain = -math.expm1(-2 * math.pi * config.bandwidth * dt)
-        self._torque = np.zeros(facts.N_JOINTS)
+        self._torque = np.zeros(n_joints)
         self._measured: deque[Array] = deque(maxlen=1 + round(config.delay / dt))
 
     def reset(self, torque: Array) -> None:
@@ -155,11 +154,11 @@ class _Feedback:
 
 
 class _Current:
-    def __init__(self, config: CurrentControl, dt: float) -> None:
+    def __init__(self, config: CurrentControl, dt: float, n_joints: int) -> None:
         self._share = -math.expm1(-2 * math.pi * config.bandwidth * dt)
         self._compensation = config.friction_compensation
         self._torque_constant = config.torque_constant
-        self._torque = np.zeros(facts.N_JOINTS)
+        self._torque = np.zeros(n_joints)
 
     def reset(self, torque: Array) -> None:
         self._torque[:] = torque

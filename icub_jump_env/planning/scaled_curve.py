@@ -11,8 +11,15 @@ import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from icub_jump_env.errors import CommandNotScalableError
-from icub_jump_env.robot.facts import GRAVITY
+from icub_jump_env.planning.plan import Setpoint
+from icub_jump_env.robot.icub import GRAVITY
+from icub_jump_env.robot.robot import Robot
+
+Array = NDArray[np.float64]
 
 ComScaling = Literal["displacement", "acceleration"]
 
@@ -115,8 +122,19 @@ class ComTrajectory:
         """CoM acceleration at take-off (m/s^2)."""
         return self.takeoff_velocity / self.duration * self.curve.acceleration(1.0)
 
-    def sample(self, time: float) -> ComSample:
-        """The reference at ``time`` (s), held at its ends outside [0, duration]."""
+    def sample(self, time: float, ballistic: bool = False) -> ComSample:
+        """The reference at ``time`` (s), held at its ends outside [0, duration].
+
+        Args:
+            time: Time since the start (s).
+            ballistic: After ``duration`` go on in free fall instead.
+        """
+        fall = time - self.duration
+        if ballistic and fall > 0.0:
+            v = self.takeoff_velocity
+            return ComSample(
+                self.displacement + fall * (v - GRAVITY * fall / 2), v - GRAVITY * fall, -GRAVITY
+            )
         u = min(max(time / self.duration, 0.0), 1.0)
         v, T = self.takeoff_velocity, self.duration
         return ComSample(
@@ -187,3 +205,46 @@ def plan_com_trajectory(
             f"accelerate by {peak:.1f} m/s^2, more than {MAX_ACCELERATION} m/s^2",
         )
     return trajectory
+
+
+class ScaledCurvePlan:
+    """The paper's plan: the scaled curve for the CoM, no momentum, the crouch as posture.
+
+    Attributes:
+        trajectory: The scaled curve.
+        landing_posture: (n,) posture of flight and landing (rad).
+    """
+
+    def __init__(self, trajectory: ComTrajectory, robot: Robot, ballistic: bool = False) -> None:
+        """Make the plan.
+
+        Args:
+            trajectory: The scaled curve.
+            robot: The robot.
+            ballistic: Whether the CoM falls freely after T, instead of staying where it is.
+        """
+        self.trajectory = trajectory
+        self._ballistic = ballistic
+        self._setpoint = Setpoint.at_rest(robot.crouch)
+        # A short launch takes off from a deeper crouch, from where the legs have to be
+        # retracted further to clear the ground.
+        share = min(1.0, trajectory.displacement / PAPER_DISPLACEMENT)
+        self.landing_posture: Array = robot.crouch + share * (robot.landing - robot.crouch)
+
+    @property
+    def duration(self) -> float:
+        """Take-off time T (s)."""
+        return self.trajectory.duration
+
+    @property
+    def displacement(self) -> float:
+        """CoM rise in the launching phase (m)."""
+        return self.trajectory.displacement
+
+    def sample(self, time: float) -> Setpoint:
+        """The set point at ``time`` (s) after the start; the next call overwrites it."""
+        setpoint, rise = self._setpoint, self.trajectory.sample(time, self._ballistic)
+        setpoint.com_position[2] = rise.position
+        setpoint.com_velocity[2] = rise.velocity
+        setpoint.com_acceleration[2] = rise.acceleration
+        return setpoint

@@ -1,4 +1,4 @@
-"""Quadratic programs as values, and the check of a solution outside its solver.
+"""Quadratic programs as values, and what became of them.
 
 Every controller of this package poses
 
@@ -127,30 +127,3 @@ def worse(first: QPReport, second: QPReport) -> QPReport:
 
 IDLE = QPReport(QPStatus.IDLE, QPResiduals(0.0, 0.0, 0.0), 0)
 """Report before the first tick."""
-
-
-def check_solution(problem: QuadraticProgram, solution: QPSolution) -> QPResiduals:
-    """Primal and dual residual and duality gap of a solution.
-
-    Args:
-        problem: The QP.
-        solution: A claimed solution; NaN entries give NaN residuals.
-
-    Returns:
-        The residuals.
-    """
-    n, g, x, multipliers = problem.n, problem.g, solution.x, solution.multipliers
-    values = np.concatenate((x, problem.C.dot(x)))
-    below, above = problem.lower - values, values - problem.upper
-    primal = np.maximum(below, above).max()
-
-    stationarity = problem.H.dot(x)
-    stationarity += g
-    stationarity += multipliers[:n]
-    stationarity += multipliers[n:].dot(problem.C)
-    dual = np.abs(stationarity).max() / (1.0 + np.abs(g).max())
-
-    # At the optimum each multiplier's bound is active; a wrong sign shows here.
-    slack = np.where(multipliers > 0, above, below)
-    gap = np.abs(multipliers).dot(np.abs(slack)) / (1.0 + abs(g.dot(x)))
-    return QPResiduals(max(float(primal), 0.0), float(dual), float(gap))

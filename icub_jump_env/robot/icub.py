@@ -1,12 +1,10 @@
-"""Numbers of the iCub that the jump depends on, each with its source.
+"""What is known of the iCubs beside their URDFs, each number with its source.
 
-Everything else (link masses, inertias, kinematics, joint position limits,
-viscous damping) is read from the ``iCubGenova04`` URDF of the icub-models
-package. ``tests/robot/test_facts.py`` asserts these numbers on the compiled
-models and on the URDF itself.
+Link masses, inertias, kinematics, joint limits and viscous damping are read from the URDFs
+of the icub-models package; ``tests/robot`` asserts these numbers on the compiled models.
 
-Joint order, everywhere in this package: Pinocchio's order of the URDF, that is
-left leg, right leg, torso, left arm, right arm.
+Joint order, everywhere in this package: Pinocchio's order of the URDF, that is left leg,
+right leg, torso, left arm, right arm.
 """
 
 from __future__ import annotations
@@ -22,8 +20,9 @@ from numpy.typing import NDArray
 GRAVITY = 9.81
 """Standard gravity of the paper and of the simulation (m/s^2)."""
 
-URDF_MODEL = "iCubGenova04"
-"""The model of the icub-models package: the paper's robot, iCub v2.5."""
+UNPHYSICAL_MODELS = ("iCubGenova03", "iCubLisboa01", "iCubNancy01")
+"""First-generation iCubs of icub-models 3.2: their URDFs have inertias of about 1e-18 kg m^2,
+some with negative eigenvalues, or meshes and sole frames that no engine here can read."""
 
 BASE_LINK = "root_link"
 """Base of the floating-base model. It faces its own -x, hence the yaw below."""
@@ -46,89 +45,73 @@ JOINT_NAMES: tuple[str, ...] = (
 )
 """The 23 joints of the jump (paper section IV); neck and wrists are locked at 0."""
 
-N_JOINTS = len(JOINT_NAMES)
 LEFT_LEG = slice(0, 6)
 RIGHT_LEG = slice(6, 12)
 TORSO = slice(12, 15)
 ARMS = slice(15, 23)
 
-JOINT_INDEX: Mapping[str, int] = MappingProxyType(
-    {name: index for index, name in enumerate(JOINT_NAMES)}
-)
-
 
 @dataclass(frozen=True)
-class Motor:
-    """Motor and transmission of one joint.
+class Transmission:
+    """Inertia of motor and gear of one joint.
 
     Attributes:
-        effort: Largest joint torque (Nm).
-        velocity: Largest joint speed (rad/s).
         rotor_inertia: Inertia of the rotor about its axis (kg m^2).
         gear_inertia: Inertia of the harmonic drive on the motor side (kg m^2).
-        gear_ratio: Motor turns per joint turn.
+        ratio: Motor turns per joint turn.
     """
 
-    effort: float
-    velocity: float
     rotor_inertia: float
     gear_inertia: float
-    gear_ratio: float
+    ratio: float
 
     @property
     def armature(self) -> float:
         """Inertia reflected to the joint side (kg m^2)."""
-        return (self.rotor_inertia + self.gear_inertia) * self.gear_ratio**2
+        return (self.rotor_inertia + self.gear_inertia) * self.ratio**2
 
 
-# Effort and speed: the legs' are the URDF's. Torso and arms carry the placeholder
-# 50000 there; 37 Nm (torso), 20 Nm (arms) and 7.64 rad/s are our assumptions: the
-# torso uses the legs' motor group, the arms a smaller one.
-# Inertias and ratios: the public configuration of IIT's whole-body-controllers for
-# the iCub (configRobot.m, "motors reflected inertia"): rotors of 0.0827e-4 kg m^2
-# (legs, torso pitch and roll) and 0.0585e-4 (torso yaw, arms), harmonic drives of
-# 0.054e-4 and 0.021e-4; ratios 100, hip pitch 150, torso yaw 200.
-_LEG_MOTOR = Motor(37.0, 7.64, 0.0827e-4, 0.054e-4, 100.0)
-_HIP_PITCH_MOTOR = Motor(55.5, 5.1, 0.0827e-4, 0.054e-4, 150.0)
-_TORSO_YAW_MOTOR = Motor(37.0, 7.64, 0.0585e-4, 0.021e-4, 200.0)
-_ARM_MOTOR = Motor(20.0, 7.64, 0.0585e-4, 0.021e-4, 100.0)
+# The public configuration of IIT's whole-body-controllers for the iCub (configRobot.m,
+# "motors reflected inertia"): rotors of 0.0827e-4 kg m^2 (legs, torso pitch and roll) and
+# 0.0585e-4 (torso yaw, arms), harmonic drives of 0.054e-4 and 0.021e-4; ratios 100, hip
+# pitch 150, torso yaw 200.
+_LEG_TRANSMISSION = Transmission(0.0827e-4, 0.054e-4, 100.0)
+_HIP_PITCH_TRANSMISSION = Transmission(0.0827e-4, 0.054e-4, 150.0)
+_TORSO_YAW_TRANSMISSION = Transmission(0.0585e-4, 0.021e-4, 200.0)
+_ARM_TRANSMISSION = Transmission(0.0585e-4, 0.021e-4, 100.0)
 
 
-def _motor_of(joint: str) -> Motor:
+def transmission(joint: str) -> Transmission:
+    """Motor and gear of the joint called ``joint``."""
     if joint.endswith("hip_pitch"):
-        return _HIP_PITCH_MOTOR
+        return _HIP_PITCH_TRANSMISSION
     if joint == "torso_yaw":
-        return _TORSO_YAW_MOTOR
+        return _TORSO_YAW_TRANSMISSION
     if joint.endswith(_ARM):
-        return _ARM_MOTOR
-    return _LEG_MOTOR
+        return _ARM_TRANSMISSION
+    return _LEG_TRANSMISSION
 
-
-MOTORS: tuple[Motor, ...] = tuple(_motor_of(name) for name in JOINT_NAMES)
-"""Motor of each joint, in joint order."""
 
 URDF_PLACEHOLDER = 50000.0
-"""Effort and velocity that the URDF gives where it knows none."""
+"""Effort and velocity that the URDFs give where they know none: torso and arms."""
 
 
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    values.setflags(write=False)
-    return values
+def assumed_limits(joint: str) -> tuple[float, float]:
+    """Effort (Nm) and speed (rad/s) of a joint whose URDF has none.
+
+    Our assumptions: the torso uses the legs' motor group, the arms a smaller one.
+    """
+    return (20.0 if joint.endswith(_ARM) else 37.0), 7.64
 
 
 SPEED_TOLERANCE = 0.03
 """Share of the speed limit by which a joint may exceed it: the servos fade out over it."""
 
-EFFORT_LIMIT = _frozen(np.array([motor.effort for motor in MOTORS]))
-"""(23,) Nm."""
-VELOCITY_LIMIT = _frozen(np.array([motor.velocity for motor in MOTORS]))
-"""(23,) rad/s."""
-ARMATURE = _frozen(np.array([motor.armature for motor in MOTORS]))
-"""(23,) kg m^2."""
-
 ANKLE_PITCH_JOINTS = ("l_ankle_pitch", "r_ankle_pitch")
 ANKLE_SHIFT = math.radians(15.0)
 """The paper's modification (section IV): the ankle pitch range moved by -15 deg."""
+SHIFTED_ANKLE = math.radians(-50.0)
+"""Where the shifted range begins. ``iCubGenova02`` has it in its URDF."""
 
 
 @dataclass(frozen=True)
@@ -154,13 +137,18 @@ class Sole:
         return (self.x_max + self.x_min) / 2
 
 
-SOLE = Sole()
+_SOLE_2_5_PLUS = Sole(x_min=-0.0588, x_max=0.1012, bottom=0.0)
+"""The same foot with its sole frame on the underside; from the URDF of the KIT_007 model."""
+SOLES: Mapping[str, Sole] = MappingProxyType(
+    {"iCubGenova02": _SOLE_2_5_PLUS, "iCubGazeboV2_5_KIT_007": _SOLE_2_5_PLUS}
+)
+"""Soles of the models whose sole is not ``Sole()``."""
 SOLE_FRAMES = ("l_sole", "r_sole")
 FEET_FRICTION = 0.8
 """Coulomb friction between soles (rubber) and floor; our assumption."""
 
 # Boxes that keep the rest of a fallen robot on the floor: centre and half size (m) in
-# the link frame, the axis-aligned bounds of the link's visual mesh.
+# the link frame, the axis-aligned bounds of the link's visual mesh (iCubGenova04).
 BODY_BOXES: Mapping[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = (
     MappingProxyType(
         {
@@ -195,7 +183,7 @@ def posture(**degrees: float) -> NDArray[np.float64]:
     Raises:
         KeyError: If a name is no joint of the robot.
     """
-    s = np.zeros(N_JOINTS)
+    s = np.zeros(len(JOINT_NAMES))
     for name, angle in degrees.items():
         indices = [
             i for i, joint in enumerate(JOINT_NAMES) if joint in (name, f"l_{name}", f"r_{name}")
@@ -203,7 +191,8 @@ def posture(**degrees: float) -> NDArray[np.float64]:
         if not indices:
             raise KeyError(name)
         s[indices] = math.radians(angle)
-    return _frozen(s)
+    s.setflags(write=False)
+    return s
 
 
 CROUCH = posture(
@@ -226,7 +215,7 @@ UNSHIFTED_CROUCH = posture(
     shoulder_roll=14.3,
     elbow=45.8,
 )
-"""The same with the ankle range as it came: CoM at 0.43 m, so less room to accelerate."""
+"""The same where the ankles do not bend that far: CoM at 0.43 m, so less room to accelerate."""
 
 LANDING = posture(
     hip_pitch=56.4,
@@ -239,8 +228,3 @@ LANDING = posture(
 )
 """Posture of flight and landing: feet retracted, stable at touch-down (section III-C). The
 CoM is over the middle of the soles, as far from the heels as from the toes."""
-
-
-def crouch(ankle_shift: bool = True) -> NDArray[np.float64]:
-    """(23,) posture (rad) the jump starts from, with or without the shifted ankles."""
-    return CROUCH if ankle_shift else UNSHIFTED_CROUCH

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from typing import Protocol
 
 import daqp
 import numpy as np
 import osqp
 import scipy.sparse as sp
 
-from icub_jump_env.control.qp import (
+from icub_jump_env.control.config import SolverName
+from icub_jump_env.control.qp.check import check_solution
+from icub_jump_env.control.qp.problem import (
     QPReport,
     QPSolution,
     QPStatus,
     QPTolerances,
     QuadraticProgram,
-    check_solution,
 )
-
-SolverName = Literal["daqp", "osqp"]
 
 
 class QPSolver(Protocol):

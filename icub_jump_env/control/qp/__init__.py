@@ -1,0 +1,1 @@
+"""Quadratic programs: the problem, its solvers, and the check outside of them."""

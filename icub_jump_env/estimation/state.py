@@ -1,0 +1,36 @@
+"""What we believe of the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class RobotState:
+    """Believed state at one control tick, SI units, world frame.
+
+    An estimator fills one instance again and again; arrays may be views of its readings
+    and of the model that it keeps up to date.
+
+    Attributes:
+        joint_position: (n,) s (rad).
+        joint_velocity: (n,) rad/s.
+        base_rotation: (3, 3) orientation of the base.
+        com: (3,) CoM position x (m).
+        com_velocity: (3,) CoM velocity (m/s).
+        angular_momentum: (3,) centroidal angular momentum H_omega (kg m^2/s).
+        foot_force: (2,) normal force under the left and right sole (N).
+    """
+
+    joint_position: Array
+    joint_velocity: Array
+    base_rotation: Array
+    com: Array
+    com_velocity: Array
+    angular_momentum: Array
+    foot_force: Array

@@ -1,0 +1,1 @@
+"""Plans of a jump: what the controllers shall track, and how a residual moves it."""

@@ -1,0 +1,66 @@
+"""What a plan is, and the set point that it gives the controllers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Setpoint:
+    """What the robot shall do at one instant, SI units, world axes; reused buffers.
+
+    Attributes:
+        com_position: (3,) x_dc (m); in a plan from where the CoM is when the jump begins, for
+            the controllers in the world.
+        com_velocity: (3,) m/s.
+        com_acceleration: (3,) m/s^2.
+        angular_momentum: (3,) centroidal angular momentum (kg m^2/s).
+        angular_momentum_rate: (3,) its derivative (Nm).
+        posture: (n,) s_d (rad).
+        posture_velocity: (n,) rad/s.
+        posture_acceleration: (n,) rad/s^2.
+    """
+
+    com_position: Array
+    com_velocity: Array
+    com_acceleration: Array
+    angular_momentum: Array
+    angular_momentum_rate: Array
+    posture: Array
+    posture_velocity: Array
+    posture_acceleration: Array
+
+    @classmethod
+    def at_rest(cls, posture: Array) -> Setpoint:
+        """Rest in a posture ((n,) rad) with the CoM at the origin."""
+        still = [np.zeros(3) for _ in range(5)]
+        return cls(*still, posture.copy(), np.zeros_like(posture), np.zeros_like(posture))
+
+
+class JumpPlan(Protocol):
+    """The plan of one jump.
+
+    Attributes:
+        duration: Take-off time T (s).
+        displacement: CoM rise in the launching phase (m).
+        landing_posture: (n,) posture of flight and landing (rad).
+    """
+
+    @property
+    def duration(self) -> float: ...  # noqa: D102
+
+    @property
+    def displacement(self) -> float: ...  # noqa: D102
+
+    @property
+    def landing_posture(self) -> Array: ...  # noqa: D102
+
+    def sample(self, time: float) -> Setpoint:
+        """The set point at ``time`` (s) after the start; the next call overwrites it."""
+        ...

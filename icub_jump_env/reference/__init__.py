@@ -1,1 +1,0 @@
-"""CoM reference: scaled trajectory (section III-A) and learned residual."""
