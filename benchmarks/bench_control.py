@@ -9,6 +9,7 @@ state to joint command, and how much faster than real time the episode runs.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -18,17 +19,20 @@ from typing import Any
 import numpy as np
 
 from icub_jump_env.config import ControllerName, JumpConfig
-from icub_jump_env.control.qp import check_solution
-from icub_jump_env.control.solvers import SolverName, make_solver
+from icub_jump_env.control.config import CONTROLLERS, SolverName, TorqueConfig
+from icub_jump_env.control.qp.check import check_solution
+from icub_jump_env.control.qp.solvers import make_solver
 from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
+from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
-from icub_jump_env.reference.com_reference import ComReference
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
-from icub_jump_env.robot import facts
+from icub_jump_env.planning.reference import Reference
+from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
-from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.robot import load_robot
 
 Sample = tuple[float, np.ndarray, np.ndarray]
 
@@ -62,39 +66,35 @@ class Stopwatch:
 
 def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
     """Print the control tick and its parts, timed in turn at the same states."""
-    model = build_pinocchio_model()
-    limits = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
-    kinematics = FeetFixedKinematics()
-    estimator, reference = FeetFixedEstimator(kinematics), ComReference()
+    robot = load_robot()
+    kinematics = FeetFixedKinematics(robot)
+    estimator = FeetFixedEstimator(kinematics)
     samples = samples_of(name, count)
-    estimator.update(*samples[0][1:])
-    reference.reset(plan_com_trajectory(0.04), estimator.com)
+    _, s, s_dot = samples[0]
+    reference = Reference(ResidualFilter(bandwidth=15.0))
+    state = estimator.estimate(Readings(s, s_dot))
+    reference.start(ScaledCurvePlan(plan_com_trajectory(0.04), robot), state.com)
     dynamics = FeetFixedDynamics(kinematics)
+    config = dataclasses.replace(CONTROLLERS[name], solver=solver)
     controller: VelocityController | TorqueController
-    if name == "torque":
-        holding = np.zeros(facts.N_JOINTS)
-        controller = TorqueController(facts.CROUCH, holding, limits, dynamics, solver=solver)
+    if isinstance(config, TorqueConfig):
+        controller = TorqueController(config, kinematics, np.zeros(robot.n_joints))
     else:
-        controller = VelocityController(facts.CROUCH, limits, 0.005, solver=solver)
-    problem = controller.problem
+        controller = VelocityController(config, kinematics)
+    qp = controller.qp
+    problem = qp.problem
     alone = make_solver(solver, problem)
 
     watch = Stopwatch()
     for now, s, s_dot in samples:
-        watch.time("estimate", partial(estimator.update, s, s_dot))
-        watch.time("CoM reference", partial(reference.update, now))
-        watch.time("tick", partial(controller.command, estimator, s, s_dot, reference))
+        readings = Readings(s, s_dot)
+        watch.time("estimate", partial(estimator.estimate, readings))
+        watch.time("set point", partial(reference.update, now))
+        setpoint = reference.setpoint
+        watch.time("tick", partial(controller.command, state, setpoint))
         if isinstance(controller, TorqueController):
             watch.time("dynamics", partial(dynamics.update, s, s_dot))
-            watch.time("pose cost", partial(controller._pose_cost, estimator, s, s_dot, reference))
-            watch.time(
-                "pose constraints", partial(controller._pose_constraints, estimator, s, s_dot)
-            )
-        else:
-            watch.time(
-                "pose the QP",
-                partial(controller._pose, estimator, s, reference),
-            )
+        watch.time("pose the QP", partial(qp.pose, state, setpoint))
         solution = watch.time("solve", alone.solve)
         watch.time("check the solution", partial(check_solution, problem, solution))
 
@@ -104,7 +104,7 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
         f"{name} tick with {solver}, from estimated state to joint command: {tick:.1f} us, "
         f"median of {count}"
     )
-    before = [f"{part} {medians.pop(part):.1f} us" for part in ("estimate", "CoM reference")]
+    before = [f"{part} {medians.pop(part):.1f} us" for part in ("estimate", "set point")]
     for part, duration in medians.items():
         print(f"  {part:24s} {duration:7.1f} us")
     print(f"  before it: {', '.join(before)}")
