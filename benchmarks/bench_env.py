@@ -18,9 +18,9 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from icub_jump_env.control.solvers import DAQPSolver
 
 from icub_jump_env.config import ControllerName, JumpConfig
-from icub_jump_env.control.solvers import DAQPSolver
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.rollout import make_env
 from icub_jump_env.metrics.jump import JumpRecorder

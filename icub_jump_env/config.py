@@ -136,6 +136,11 @@ _PATHS: Mapping[str, tuple[str, ...]] = {
 }
 
 
+def group_of(shortcut: str) -> str | None:
+    """The field of :class:`JumpConfig` that holds what a shortcut stands for."""
+    return _PATHS[shortcut][0] if shortcut in _PATHS else None
+
+
 @dataclass(frozen=True)
 class JumpConfig:
     """What ``gymnasium.make("ICubJump-v0", ...)`` takes, beside the :class:`Shortcuts`.
@@ -349,6 +354,16 @@ class JumpConfig:
             default = made.controller_config if group == "controller" else getattr(made, group)
             groups[group] = _set(groups.get(group, default), path, value)
         return dataclasses.replace(made, **groups) if groups else made
+
+    def value_of(self, name: str) -> Any:
+        """The value of a field or shortcut; of the controller its name."""
+        if name == "controller":
+            return self.controller_name
+        first, *path = _PATHS.get(name, (name,))
+        value = self.controller_config if first == "controller" else getattr(self, first)
+        for step in path:
+            value = getattr(value, step)
+        return value
 
     def for_controller(self, name: ControllerName) -> Self:
         """The same jump with the other controller at its own gains and rate."""

@@ -110,9 +110,7 @@ class ControllerConfig:
         store(self, frequency=check_number("frequency", self.frequency, 1.0, 1e5))
         check_choice("solver", self.solver, get_args(SolverName))
         check_choice("constraints", self.constraints, get_args(Constraints))
-        store(
-            self, momentum_control=check_flag("momentum_control", self.momentum_control)
-        )
+        store(self, momentum_control=check_flag("momentum_control", self.momentum_control))
         check_type("phases", self.phases, PhaseConfig)
 
 

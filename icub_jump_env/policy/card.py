@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Self, get_args
 
 from icub_jump_env.checks import check_choice, check_count, check_number, check_seed, store
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import JumpConfig, group_of
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy.fields import (
@@ -25,11 +25,13 @@ from icub_jump_env.policy.fields import (
     check_results,
     check_versions,
 )
+from icub_jump_env.robot.urdf import DEFAULT_MODEL
 
 FORMAT = 1
 """Format of the files that this version reads and writes."""
 
 TASK_FIELDS = (
+    "robot",
     "controller",
     "com_displacement",
     "com_scaling",
@@ -40,7 +42,7 @@ TASK_FIELDS = (
     "agent_frequency",
     "ankle_shift",
 )
-"""The fields of the configuration that say what an action does and when.
+"""The fields and shortcuts of the configuration that say what an action does and when.
 
 The others may differ from those of the training: a policy is meant for other commands,
 and to be tried on other actuators, sensors and worlds; solver and physics step decide how
@@ -141,8 +143,7 @@ def mismatches(card: PolicyCard, config: JumpConfig) -> list[tuple[str, Any, Any
     """
     theirs, ours = dict(card.observation), entry_scales()
     pairs = [(f"observation.{name}", theirs.get(name), ours.get(name)) for name in theirs | ours]
-    trained, present = _explicit(card.config), _explicit(config)
-    pairs += [(name, getattr(trained, name), getattr(present, name)) for name in TASK_FIELDS]
+    pairs += [(name, card.config.value_of(name), config.value_of(name)) for name in TASK_FIELDS]
     return [pair for pair in pairs if pair[1] != pair[2]]
 
 
@@ -157,17 +158,14 @@ def check_match(card: PolicyCard, config: JumpConfig) -> None:
         raise PolicyMismatchError(differences)
 
 
-def _explicit(config: JumpConfig) -> JumpConfig:
-    """The same with the controller's default rate written out."""
-    return dataclasses.replace(config, control_frequency=config.control_rate)
-
-
 def _check_config(config: Any) -> JumpConfig:
     if isinstance(config, JumpConfig):
         return config
-    checked = JumpConfig.from_kwargs(check_mapping("config", config))
+    # Before there was a choice, it was this robot.
+    explicit = {"robot": DEFAULT_MODEL, **check_mapping("config", config)}
+    checked = JumpConfig.from_kwargs(explicit)
     for field in TASK_FIELDS:
         # Else the policy would change with the default.
-        if field not in config:
+        if field not in explicit and group_of(field) not in explicit:
             raise ConfigError("config", sorted(config), f"a configuration with {field}")
     return checked

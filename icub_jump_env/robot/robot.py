@@ -151,7 +151,7 @@ def load_robot(name: str = DEFAULT_MODEL, ankle_shift: bool = True) -> Robot:
         velocity_limit=limits("velocity"),
         effort_limit=limits("effort"),
         armature=_frozen([icub.transmission(joint).armature for joint in icub.JOINT_NAMES]),
-        crouch=icub.CROUCH if (icub.CROUCH > lower).all() else icub.UNSHIFTED_CROUCH,
+        crouch=icub.CROUCH if (lower < icub.CROUCH).all() else icub.UNSHIFTED_CROUCH,
         landing=icub.LANDING,
         sole=icub.SOLES.get(name, Sole()),
         joint_names=icub.JOINT_NAMES,

@@ -101,9 +101,7 @@ def _set_limits(joint: ET.Element, ankle_shift: bool) -> None:
     name = joint.attrib["name"]
     limit = joint.find("limit")
     assert limit is not None
-    for attribute, assumed in zip(
-        ("effort", "velocity"), icub.assumed_limits(name), strict=True
-    ):
+    for attribute, assumed in zip(("effort", "velocity"), icub.assumed_limits(name), strict=True):
         if float(limit.attrib[attribute]) == icub.URDF_PLACEHOLDER:
             limit.set(attribute, repr(assumed))
     shifted = float(limit.attrib["lower"]) < icub.SHIFTED_ANKLE + 1e-6

@@ -139,6 +139,7 @@ RANDOMIZATIONS: Mapping[RandomizationName, Randomization] = MappingProxyType(
 )
 """Ranges by name: ``mild`` is half of ``full``; ``hard`` adds slope, encoder bias and pushes."""
 
+
 @dataclass(frozen=True, eq=False)
 class World:
     """What was drawn for one episode; the meaning is that of :class:`Randomization`.

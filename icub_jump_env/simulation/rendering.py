@@ -29,9 +29,7 @@ class Renderer(Protocol):
         ...
 
 
-def make_renderer(
-    physics: Physics, mode: str, width: int, height: int, camera: str
-) -> Renderer:
+def make_renderer(physics: Physics, mode: str, width: int, height: int, camera: str) -> Renderer:
     """A renderer for ``rgb_array`` or ``human``.
 
     Args:

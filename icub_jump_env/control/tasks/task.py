@@ -74,5 +74,3 @@ class Limit(Protocol):
     def write(self, state: RobotState, buffers: LimitBuffers) -> None:
         """Write what changes; once per control tick."""
         ...
-
-

@@ -16,6 +16,7 @@ FRICTION_SPEED = 0.05
 """Speed (rad/s) over which Coulomb friction builds up: tanh(s_dot / this). Ours: as small as
 the explicit integration at 2 ms bears."""
 
+
 class Actuators:
     """Servo or torque loop, then the motor's limits, then friction.
 
