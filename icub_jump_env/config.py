@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Literal, Self, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -90,11 +91,6 @@ class RenderConfig:
         check_choice("camera", self.camera, get_args(CameraName))
 
 
-def _stands_for(*path: str) -> Any:
-    """A field of :class:`Shortcuts`; ``path`` leads to the field that it stands for."""
-    return field(default=None, metadata={"path": path})
-
-
 @dataclass(frozen=True)
 class Shortcuts:
     """Fields inside the groups that ``gymnasium.make`` and ``eval.py`` take by themselves.
@@ -117,23 +113,38 @@ class Shortcuts:
         camera: Where pictures are taken from.
     """
 
-    solver: SolverName | None = _stands_for("controller", "solver")
-    constraints: Constraints | None = _stands_for("controller", "constraints")
-    momentum_control: bool | None = _stands_for("controller", "momentum_control")
-    control_frequency: float | None = _stands_for("controller", "frequency")
-    launch_end: LaunchEnd | None = _stands_for("controller", "phases", "launch_end")
-    residual_scale: tuple[float, float, float] | None = _stands_for("residual", "scale")
-    residual_phases: ResidualPhases | None = _stands_for("residual", "phases")
-    stand_time: float | None = _stands_for("success", "stand_time")
-    render_mode: RenderMode | None = _stands_for("rendering", "mode")
-    width: int | None = _stands_for("rendering", "width")
-    height: int | None = _stands_for("rendering", "height")
-    camera: CameraName | None = _stands_for("rendering", "camera")
+    solver: SolverName | None = None
+    constraints: Constraints | None = None
+    momentum_control: bool | None = None
+    control_frequency: float | None = None
+    launch_end: LaunchEnd | None = None
+    residual_scale: tuple[float, float, float] | None = None
+    residual_phases: ResidualPhases | None = None
+    stand_time: float | None = None
+    render_mode: RenderMode | None = None
+    width: int | None = None
+    height: int | None = None
+    camera: CameraName | None = None
 
 
-_PATHS: Mapping[str, tuple[str, ...]] = {
-    field.name: field.metadata["path"] for field in dataclasses.fields(Shortcuts)
-}
+_PATHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "solver": ("controller", "solver"),
+        "constraints": ("controller", "constraints"),
+        "momentum_control": ("controller", "momentum_control"),
+        "control_frequency": ("controller", "frequency"),
+        "launch_end": ("controller", "phases", "launch_end"),
+        "residual_scale": ("residual", "scale"),
+        "residual_phases": ("residual", "phases"),
+        "stand_time": ("success", "stand_time"),
+        "render_mode": ("rendering", "mode"),
+        "width": ("rendering", "width"),
+        "height": ("rendering", "height"),
+        "camera": ("rendering", "camera"),
+    }
+)
+"""Where the field is that a shortcut stands for: a group of :class:`JumpConfig`, and the way
+into it."""
 
 
 def group_of(shortcut: str) -> str | None:
@@ -222,13 +233,13 @@ class JumpConfig:
         for name, preset in CONTROLLERS.items():
             if self.controller == preset:
                 store(self, controller=name)
-        for name, kind in (
+        for name, group in (
             ("residual", ResidualConfig),
             ("reward", RewardConfig),
             ("success", SuccessConfig),
             ("rendering", RenderConfig),
         ):
-            check_type(name, self._from_mapping(name), kind)
+            check_type(name, self._from_mapping(name), group)
 
     def _from_mapping(self, name: str) -> Any:
         """A group, made of the plain mapping that a file has in its place."""

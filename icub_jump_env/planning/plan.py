@@ -39,8 +39,16 @@ class Setpoint:
     @classmethod
     def at_rest(cls, posture: Array) -> Setpoint:
         """Rest in a posture ((n,) rad) with the CoM at the origin."""
-        still = [np.zeros(3) for _ in range(5)]
-        return cls(*still, posture.copy(), np.zeros_like(posture), np.zeros_like(posture))
+        return cls(
+            com_position=np.zeros(3),
+            com_velocity=np.zeros(3),
+            com_acceleration=np.zeros(3),
+            angular_momentum=np.zeros(3),
+            angular_momentum_rate=np.zeros(3),
+            posture=posture.copy(),
+            posture_velocity=np.zeros_like(posture),
+            posture_acceleration=np.zeros_like(posture),
+        )
 
 
 class JumpPlan(Protocol):
