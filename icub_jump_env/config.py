@@ -252,8 +252,12 @@ class JumpConfig:
     def _check_rates(self) -> None:
         physics, control = 1.0 / self.timestep, self.controller_config.frequency
         if not is_multiple(physics, control):
+            if control == CONTROLLERS[self.controller_name].frequency:
+                raise ConfigError(
+                    "timestep", self.timestep, f"a fraction of the control period, 1/{control:g} s"
+                )
             raise ConfigError(
-                "timestep", self.timestep, f"a fraction of the control period, 1/{control:g} s"
+                "control_frequency", control, f"a divisor of the physics rate of {physics:g} Hz"
             )
         agent = check_number("agent_frequency", self.agent_frequency, *AGENT_FREQUENCY_RANGE)
         if not is_multiple(control, agent):
@@ -351,20 +355,25 @@ class JumpConfig:
             ConfigError: If a value is out of range.
         """
         names = [field.name for field in dataclasses.fields(self)]
-        given: dict[tuple[str, ...], Any] = {}
-        for name in [name for name in changes if name not in names]:
-            if name not in _PATHS:
+        for name, value in changes.items():
+            if name not in names and name not in _PATHS:
                 allowed = f"no such field; the fields are {', '.join([*names, *_PATHS])}"
-                raise UnknownFieldError(name, changes[name], allowed)
-            if changes[name] is not None:
-                given[_PATHS[name]] = changes[name]
-            del changes[name]
-        made = dataclasses.replace(self, **changes)
-        groups: dict[str, Any] = {}
-        for (group, *path), value in given.items():
-            default = made.controller_config if group == "controller" else getattr(made, group)
-            groups[group] = _set(groups.get(group, default), path, value)
-        return dataclasses.replace(made, **groups) if groups else made
+                raise UnknownFieldError(name, value, allowed)
+        fields = {name: value for name, value in changes.items() if name in names}
+        made = dataclasses.replace(self, **fields)
+        for name, value in changes.items():
+            if name not in names and value is not None:
+                made = made._with_shortcut(name, value)
+        return made
+
+    def _with_shortcut(self, name: str, value: Any) -> Self:
+        first, *path = _PATHS[name]
+        group = self.controller_config if first == "controller" else getattr(self, first)
+        try:
+            group = _set(group, path, value)
+        except ConfigError as error:
+            raise type(error)(name, error.value, error.allowed) from None
+        return dataclasses.replace(self, **{first: group})
 
     def value_of(self, name: str) -> Any:
         """The value of a field or shortcut; of the controller its name."""
