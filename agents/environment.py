@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.jump import RESIDUAL_TIME
 from icub_jump_env.env import ICubJumpEnv
-from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
+from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
 from icub_jump_env.observation import OBSERVATION_LIMIT, entry_scales
 from icub_jump_env.policy import Policy
 from icub_jump_env.policy.fields import AXES

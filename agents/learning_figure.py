@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from agents.shipped import CURVE_SUFFIX
-from icub_jump_env.evaluation.summary import interquartile_mean
-from icub_jump_env.evaluation.table import CM
+from experiments.shipped import CURVE_SUFFIX
+from icub_jump_env.evaluation.statistics.summary import interquartile_mean
+from icub_jump_env.evaluation.quantities import CM
 
 _NAME = re.compile(r"(?P<group>velocity|torque)-seed\d+" + re.escape(CURVE_SUFFIX))
 _COLORS = {"velocity": "tab:blue", "torque": "tab:orange"}

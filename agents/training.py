@@ -34,13 +34,13 @@ from agents.options import COMMAND, OPTIONS, TrainOptions, read_options
 from agents.ppo import export, freeze_policy, make_model, set_noise
 from agents.run_folder import lock_run
 from agents.seeds import SELECTION
-from agents.workers import JumpVecEnv
+from agents.vec_env import JumpVecEnv
 from icub_jump_env.errors import ConfigError, PolicyFileError
-from icub_jump_env.evaluation.output import progress_display, say, write_json
-from icub_jump_env.evaluation.provenance import SOURCE, command, source, versions
-from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.summary import Summary, by_command, command_range
-from icub_jump_env.evaluation.table import CM, DEG
+from icub_jump_env.evaluation.report.output import progress_display, say, write_json
+from icub_jump_env.evaluation.report.provenance import SOURCE, command, source, versions
+from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_range
+from icub_jump_env.evaluation.quantities import CM, DEG
 from icub_jump_env.policy import load_policy, save_policy
 from icub_jump_env.policy.fields import check_command
 

@@ -23,7 +23,7 @@ from icub_jump_env.control.solvers import SolverName, make_solver
 from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
-from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
 from icub_jump_env.reference.com_reference import ComReference
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 from icub_jump_env.robot import facts

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode, traced
 
 settings.register_profile("ci", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("ci")

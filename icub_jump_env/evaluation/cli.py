@@ -21,7 +21,7 @@ from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.opengl import import_mujoco
 
 if TYPE_CHECKING:
-    from icub_jump_env.evaluation.contender import Contender
+    from icub_jump_env.evaluation.episodes.contender import Contender
 
 T = TypeVar("T")
 
@@ -123,7 +123,7 @@ def _evaluate(arguments: Sequence[str]) -> None:
     options = parse(EvalOptions, arguments, _as_trained(arguments))
     import_mujoco()
     # Imported here, like the modes, so that --help and bad arguments answer at once.
-    from icub_jump_env.evaluation.output import check_writable, say
+    from icub_jump_env.evaluation.report.output import check_writable, say
 
     for name in ("json", "video", "results"):
         path = getattr(options, name)
@@ -132,11 +132,11 @@ def _evaluate(arguments: Sequence[str]) -> None:
     if options.plot is not None:
         check_writable("plot", options.plot, folder=True)
     if options.video is not None:
-        from icub_jump_env.evaluation.video import check_video, record_video
+        from icub_jump_env.evaluation.modes.video import check_video, record_video
 
         check_video(options.video)
 
-    from icub_jump_env.evaluation.contender import read_contenders
+    from icub_jump_env.evaluation.episodes.contender import read_contenders
     from icub_jump_env.policy import check_match
 
     words = options.compare or (options.policy or "baseline",)
@@ -160,7 +160,7 @@ def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
     found = seek(arguments, "compare", "policy")
     if not found:
         return None
-    from icub_jump_env.evaluation.contender import as_trained, read_contenders
+    from icub_jump_env.evaluation.episodes.contender import as_trained, read_contenders
 
     contenders = read_contenders(found.get("compare") or found["policy"])
     cards = [contender.card for contender in contenders if contender.card is not None]
@@ -179,34 +179,34 @@ def _run_mode(
 ) -> None:
     match options.mode:
         case "statistics":
-            from icub_jump_env.evaluation.statistics import run_statistics
+            from icub_jump_env.evaluation.modes.statistics import run_statistics
 
             run_statistics(options, contenders[0], console, progress)
         case "compare":
-            from icub_jump_env.evaluation.compare import run_compare
+            from icub_jump_env.evaluation.modes.compare import run_compare
 
             run_compare(options, contenders, console, progress)
         case "study":
-            from icub_jump_env.evaluation.study import run_study
+            from icub_jump_env.evaluation.modes.study import run_study
 
             run_study(options, console, progress)
         case "sweep":
-            from icub_jump_env.evaluation.sweep import run_sweep
+            from icub_jump_env.evaluation.modes.sweep import run_sweep
 
             run_sweep(options, console, progress)
         case "view":
-            from icub_jump_env.evaluation.view import view
+            from icub_jump_env.evaluation.modes.view import view
 
             view(options.config, options.seed, console, policy=contenders[0].policy)
         case "report":
-            from icub_jump_env.evaluation.output import say
-            from icub_jump_env.evaluation.report import write_report
+            from icub_jump_env.evaluation.report.output import say
+            from icub_jump_env.evaluation.modes.report import write_report
 
             assert options.report is not None  # else it were another mode
             file = write_report(options.report, options.config, options.seed, progress)
             say(console, f"wrote {file}")
         case _:
-            from icub_jump_env.evaluation.nominal import print_nominal
+            from icub_jump_env.evaluation.modes.nominal import print_nominal
 
             print_nominal(options, contenders[0], console, progress)
 

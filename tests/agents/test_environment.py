@@ -11,7 +11,7 @@ from stable_baselines3.common.env_checker import check_env
 from agents.environment import LaunchEnv, acting_steps
 from agents.options import TASK
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.rollout import make_env, run_episode
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy import NetworkPolicy
 from icub_jump_env.policy.fields import AXES

@@ -14,9 +14,9 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from troubled_env import TroubledEnv
 
 from agents import workers
-from agents.workers import JumpVecEnv
+from agents.vec_env import JumpVecEnv
 from icub_jump_env.errors import InvalidValueError
-from icub_jump_env.evaluation.parallel import WorkerError
+from icub_jump_env.evaluation.episodes.parallel import WorkerError
 
 ACTION = np.zeros((2, 1), np.float32)
 
@@ -145,7 +145,7 @@ import sys
 if __name__ == "__main__":
     import numpy as np
 
-    from agents.workers import JumpVecEnv
+    from agents.vec_env import JumpVecEnv
     from troubled_env import TroubledEnv
 
     try:

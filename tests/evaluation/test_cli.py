@@ -15,7 +15,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation import cli, video
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import write_json
+from icub_jump_env.evaluation.report.output import write_json
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -219,7 +219,7 @@ def test_interrupt_ends_with_one_line(capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("icub_jump_env.evaluation.nominal.run_episode", interrupted)
+    monkeypatch.setattr("icub_jump_env.evaluation.modes.nominal.run_episode", interrupted)
     code, _, err = evaluate(capsys)
     assert code == 130
     assert err.strip().splitlines()[-1] == "interrupted"

@@ -14,10 +14,10 @@ from rich.console import Console
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation import policy_figure, video, view
-from icub_jump_env.evaluation.contender import read_contenders
-from icub_jump_env.evaluation.log import EpisodeLog
-from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
-from icub_jump_env.evaluation.series import Series
+from icub_jump_env.evaluation.episodes.contender import read_contenders
+from icub_jump_env.evaluation.episodes.log import EpisodeLog
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.series import Series
 from icub_jump_env.policy import load_policy
 
 QUIET = Console(file=io.StringIO())
@@ -351,7 +351,7 @@ def test_the_default_log_is_another_one_after_the_code_has_changed(monkeypatch):
     series = Series(JumpConfig(), range(3))
     before = series.default_log()
     assert before == series.default_log()
-    monkeypatch.setattr("icub_jump_env.evaluation.series.source", lambda: "of tomorrow")
+    monkeypatch.setattr("icub_jump_env.evaluation.episodes.series.source", lambda: "of tomorrow")
     assert series.default_log() != before
 
 
@@ -360,5 +360,5 @@ def test_a_series_is_completed_from_its_log(monkeypatch, tmp_path):
     series = Series(JumpConfig(stand_time=0.0), range(2))
     episodes = series.complete(1, QUIET)
     assert [episode.seed for episode in episodes] == [0, 1]
-    monkeypatch.setattr("icub_jump_env.evaluation.series.run_jobs", lambda work, jobs: iter(work))
+    monkeypatch.setattr("icub_jump_env.evaluation.episodes.series.run_jobs", lambda work, jobs: iter(work))
     assert series.complete(1, QUIET) == episodes

@@ -17,7 +17,7 @@ import pytest
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation import parallel
-from icub_jump_env.evaluation.parallel import Job, WorkerError, run_jobs
+from icub_jump_env.evaluation.episodes.parallel import Job, WorkerError, run_jobs
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -140,7 +140,7 @@ def test_ray_that_does_not_start_is_named(monkeypatch):
 PROGRAM = """
 import sys
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.parallel import Job, run_jobs
+from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
 
 try:
     work = [Job(JumpConfig(stand_time=0.0), seed) for seed in range(10_000)]

@@ -24,8 +24,8 @@ from shows import SHORT, Clock, ScriptedScreen
 
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation import view
-from icub_jump_env.evaluation.rollout import make_env, traced
-from icub_jump_env.evaluation.view import Playback, Show
+from icub_jump_env.evaluation.episodes.rollout import make_env, traced
+from icub_jump_env.evaluation.modes.view import Playback, Show
 from icub_jump_env.simulation.opengl import has_display
 from icub_jump_env.simulation.viewers import window
 from icub_jump_env.simulation.viewers.screen import Command, CommandQueue, Stage
@@ -216,7 +216,7 @@ def test_ctrl_c_ends_the_show_without_a_complaint():
     program = (
         "from rich.console import Console\n"
         "from icub_jump_env.config import JumpConfig\n"
-        "from icub_jump_env.evaluation.view import view\n"
+        "from icub_jump_env.evaluation.modes.view import view\n"
         "view(JumpConfig(), 0, Console(), 'browser')\n"
         "print('ended')\n"
     )

@@ -7,8 +7,8 @@ import pytest
 from contenders import episode, outcomes
 from scipy.stats import norm
 
-from icub_jump_env.evaluation.failures import Failure
-from icub_jump_env.evaluation.summary import Rate, Summary, by_command
+from icub_jump_env.evaluation.episodes.failures import Failure
+from icub_jump_env.evaluation.statistics.summary import Rate, Summary, by_command
 
 
 @pytest.mark.parametrize(("count", "total"), [(0, 10), (7, 10), (200, 200), (190, 200)])

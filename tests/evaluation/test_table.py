@@ -5,8 +5,8 @@ import math
 import pytest
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.table import comparison_rows, verdict
+from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.quantities import comparison_rows, verdict
 
 
 def episode(**jump):

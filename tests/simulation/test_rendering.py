@@ -53,7 +53,7 @@ def test_video_is_recorded(offscreen, tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     file = tmp_path / "jump.mp4"
     program = (
-        "from icub_jump_env.evaluation.video import record_video\n"
+        "from icub_jump_env.evaluation.modes.video import record_video\n"
         "from icub_jump_env.config import JumpConfig\n"
         "from rich.console import Console\n"
         "from pathlib import Path\n"

@@ -1,0 +1,27 @@
+"""What is shipped in agents/pretrained, and the jumps to judge it by."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from agents.options import TASK
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.episodes.contender import Contender, as_trained
+
+PRETRAINED = Path(__file__).parent / "pretrained"
+"""Policies."""
+
+RUNS = PRETRAINED / "runs"
+"""The best policy of every training, and its learning curve."""
+
+CURVE_SUFFIX = ".curve.json"
+"""End of the names of the curves."""
+
+
+def judged_config(contender: Contender) -> JumpConfig:
+    """The task's commands and worlds, with what a policy depends on as in its training."""
+    assert contender.card is not None  # it was read from a file
+    return dataclasses.replace(
+        as_trained(contender.card), jump_height=TASK.jump_height, randomization=TASK.randomization
+    )

@@ -1,0 +1,142 @@
+"""What some episodes say together."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest, trim_mean
+
+from icub_jump_env.evaluation.episodes.failures import Failure
+from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.quantities import CM, QUANTITIES
+
+CONFIDENCE = 0.95
+
+interquartile_mean = functools.partial(trim_mean, proportiontocut=0.25)
+"""Mean of the middle half, as reported of training seeds."""
+
+_METRICS = (*(metric for _, metric, *_ in QUANTITIES), "landing_force", "joint_work")
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share of episodes with its Wilson interval."""
+
+    count: int
+    total: int
+
+    @property
+    def share(self) -> float:
+        """Observed share."""
+        return self.count / self.total
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson interval of 95 %."""
+        interval = binomtest(self.count, self.total).proportion_ci(CONFIDENCE, method="wilson")
+        return float(interval.low), float(interval.high)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"count": self.count, "total": self.total, "interval": self.interval}
+
+    def __str__(self) -> str:
+        low, high = self.interval
+        return (
+            f"{100 * self.share:.1f} % ({self.count} of {self.total}; "
+            f"95 % interval {100 * low:.1f} to {100 * high:.1f} %)"
+        )
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a set of episodes says, in whatever order they are.
+
+    Attributes:
+        success: At least 0.7 of the commanded height, and landed.
+        landed: Landed and stands.
+        mean_rise: Mean flight height (m) of all episodes: the CoM's rise after take-off.
+        mean_sole_height: Mean height of the soles (m); zero without a flight. It tells a higher
+            jump from an earlier take-off.
+        mean_height_error: Mean distance of the flight height from the command (m).
+        median_rotation: Median size of the rotation in flight (rad); NaN without a flight.
+        percentiles: 10th, 50th and 90th percentile of each metric, SI units, over the
+            episodes where it is defined; NaN if there is none.
+        failures: Seeds of the failed episodes by class.
+    """
+
+    success: Rate
+    landed: Rate
+    mean_rise: float
+    mean_sole_height: float
+    mean_height_error: float
+    median_rotation: float
+    percentiles: Mapping[str, tuple[float, float, float]]
+    failures: Mapping[Failure, tuple[int, ...]]
+
+    @classmethod
+    def of(cls, episodes: Sequence[Episode]) -> Summary:
+        """The summary of some episodes."""
+        values = {
+            metric: np.sort([float(episode.jump[metric]) for episode in episodes])
+            for metric in _METRICS
+        }
+        errors = np.sort([abs(e.jump["flight_height"] - e.jump_height) for e in episodes])
+        failures = {
+            kind: tuple(sorted(e.seed for e in episodes if e.failure is kind)) for kind in Failure
+        }
+        return cls(
+            success=Rate(sum(e.is_success for e in episodes), len(episodes)),
+            landed=Rate(sum(bool(e.jump["landed"]) for e in episodes), len(episodes)),
+            mean_rise=float(values["flight_height"].mean()),
+            mean_sole_height=float(np.nan_to_num(values["sole_height"]).mean()),
+            mean_height_error=float(errors.mean()),
+            median_rotation=_percentiles(np.abs(values["flight_rotation"]))[1],
+            percentiles={metric: _percentiles(found) for metric, found in values.items()},
+            failures={kind: seeds for kind, seeds in failures.items() if seeds},
+        )
+
+    def median(self, metric: str) -> float:
+        """Median of a metric, over the episodes where it is defined."""
+        return self.percentiles[metric][1]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return vars(self) | {"success": self.success.as_dict(), "landed": self.landed.as_dict()}
+
+
+def _percentiles(values: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, float, float]:
+    defined = values[~np.isnan(values)]
+    if not defined.size:
+        return math.nan, math.nan, math.nan
+    p10, p50, p90 = np.percentile(defined, [10, 50, 90])
+    return float(p10), float(p50), float(p90)
+
+
+def command_range(jump_height: float) -> tuple[int, int]:
+    """The whole centimetres that a command (m) lies between."""
+    low = math.floor(CM * jump_height + 1e-9)
+    return low, low + 1
+
+
+def by_command(episodes: Sequence[Episode]) -> dict[tuple[int, int], list[Episode]]:
+    """Episodes by the centimetres that their command lies between, ascending."""
+
+    def key(episode: Episode) -> tuple[int, int]:
+        return command_range(episode.jump_height)
+
+    groups = itertools.groupby(sorted(episodes, key=key), key=key)
+    return {command: list(group) for command, group in groups}
+
+
+def command_labels(episodes: Sequence[Episode]) -> dict[tuple[int, int], str]:
+    """What to call the groups of :func:`by_command`; a single command by itself."""
+    commands = {episode.jump_height for episode in episodes}
+    alone = f"{CM * min(commands):g} cm" if len(commands) == 1 else None
+    return {(low, high): alone or f"{low} to {high} cm" for low, high in by_command(episodes)}
