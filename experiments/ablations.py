@@ -2,7 +2,7 @@
 
     python -m experiments.ablations --jobs 2
 
-prints one row per kind of training in agents/pretrained/runs: what it reaches and what it
+prints one row per kind of training in experiments/runs: what it reaches and what it
 gains over the baseline. An interrupted evaluation goes on where it stopped.
 """
 
@@ -15,26 +15,23 @@ import sys
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from agents.seeds import TEST
+from experiments.seeds import TEST
 from experiments.shipped import CURVE_SUFFIX, RUNS, judged_config
 from icub_jump_env.checks import check_count
-from icub_jump_env.config import ControllerName, JumpConfig
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
-from icub_jump_env.evaluation.report.output import show
-from icub_jump_env.evaluation.episodes.parallel import check_jobs
 from icub_jump_env.evaluation.episodes.series import Series
-from icub_jump_env.evaluation.statistics.summary import CONFIDENCE, interquartile_mean
-from icub_jump_env.evaluation.quantities import CM
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT, seeds
+from icub_jump_env.evaluation.report.output import new_table, show
+from icub_jump_env.evaluation.statistics.intervals import CONFIDENCE, interquartile_mean
 
 _NAME = re.compile(r"(?P<kind>[\w-]+)-seed\d+")
 _EPISODES = 200
@@ -63,33 +60,40 @@ class AblationOptions:
 def compare_trainings(options: AblationOptions) -> None:
     """Evaluate all runs and print the table."""
     console, progress = Console(), Console(stderr=True)
-    check_jobs(options.jobs)
     files = sorted(RUNS.glob("*.safetensors"))
     if not files:
-        raise ConfigError("runs", str(RUNS), "a folder with policies: python -m experiments.evidence")
+        raise ConfigError(
+            "runs", str(RUNS), "a folder with policies: python -m experiments.evidence"
+        )
     kinds = defaultdict(list)
     for contender in read_contenders([str(file) for file in files]):
         if match := _NAME.fullmatch(contender.name):
             kinds[match["kind"]].append(contender)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("training", no_wrap=True)
-    for column in ("seeds", "success, %", "gain", "rise, cm", "gain", "soles, cm", "gain", "min"):
-        table.add_column(column, justify="right", no_wrap=True)
-    headline = get_args(ControllerName)
-    for kind, members in sorted(kinds.items(), key=lambda item: item[0] not in headline):
+    table = new_table(
+        1,
+        "training",
+        "seeds",
+        "success, %",
+        "gain",
+        "rise, cm",
+        "gain",
+        "soles, cm",
+        "gain",
+        "min",
+    )
+    for kind, members in sorted(kinds.items(), key=lambda item: item[0] not in CONTROLLERS):
         config = judged_config(members[0])
         baseline = _jumps(config, BASELINE, options, progress)
-        if kind in headline:
+        if kind in CONTROLLERS:
             _add(table, f"{kind}, baseline", baseline)
         jumps = np.stack([_jumps(config, member, options, progress) for member in members])
         _add(table, kind, jumps, baseline, [_minutes(member.name) for member in members])
     table.caption = (
-        f"seeds {TEST[0]} to {TEST[options.episodes - 1]}; interquartile means over the training "
+        f"{seeds(TEST[: options.episodes])}; interquartile means over the training "
         "seeds; gain over the baseline in the same episodes, with its bootstrap interval of 95 %: "
         "over training seeds and episodes (of few seeds: too narrow rather than too wide), or over "
         "the episodes of a single training, whose luck it does not show"
     )
-    table.caption_justify = "left"
     show(console, table)
 
 
@@ -99,7 +103,7 @@ def _jumps(
     """Success (%), rise and height of the soles (cm) of each episode (3, n)."""
     series = Series(config, TEST[: options.episodes], contender)
     found = [
-        (100.0 * e.is_success, CM * e.jump["flight_height"], CM * e.jump["sole_height"])
+        (PERCENT * e.is_success, CM * e.jump["flight_height"], CM * e.jump["sole_height"])
         for e in series.complete(options.jobs, progress)
     ]
     jumps: Array = np.nan_to_num(found).T  # without a flight: no height

@@ -3,7 +3,7 @@
     python -m experiments.evidence
 
 trains whatever is not finished in runs/ (hours on two cores; an interrupted one goes on),
-fills agents/pretrained/, draws the learning curves, and runs docs/update.py.
+fills experiments/runs/ and agents/pretrained/, draws the learning curves, and runs docs/update.py.
 """
 
 from __future__ import annotations
@@ -15,30 +15,29 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from rich.console import Console
 
-from experiments.figures import learning_curves
 from agents.options import OPTIONS, TrainOptions, read_options
-from experiments.rivals import best_constant, open_loop
-from agents.seeds import TEST
-from experiments.shipped import CURVE_SUFFIX, PRETRAINED, RUNS
 from agents.training import BEST, CURVE, LAST, other_code
+from experiments.figures import learning_curves
+from experiments.rivals import best_constant, open_loop
+from experiments.seeds import TEST
+from experiments.shipped import CURVE_SUFFIX, PRETRAINED, REPOSITORY, RUNS
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import Contender, read_contenders
-from icub_jump_env.evaluation.report.output import say
-from icub_jump_env.evaluation.episodes.parallel import check_jobs
-from icub_jump_env.evaluation.report.provenance import SOURCE, source, versions
 from icub_jump_env.evaluation.episodes.series import Series
+from icub_jump_env.evaluation.quantities import CONTROLLERS
+from icub_jump_env.evaluation.report.output import say
+from icub_jump_env.evaluation.report.provenance import SOURCE, source, versions
 from icub_jump_env.evaluation.statistics.summary import Summary
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
 from icub_jump_env.policy.saving import LoadedPolicy
 
-REPOSITORY = Path(__file__).parents[1]
 EVIDENCE = Path("runs/evidence")
 """Where the runs are, in it."""
 
@@ -83,10 +82,10 @@ def trainings() -> dict[str, tuple[str, ...]]:
     """Arguments of train.py for every training, by the name of its policy."""
     named: dict[str, tuple[str, ...]] = {}
     for seed in HEADLINE_SEEDS:
-        for controller in get_args(ControllerName):
+        for controller in CONTROLLERS:
             named[f"{controller}-seed{seed}"] = ("--controller", controller, "--seed", str(seed))
     for seed in ABLATION_SEEDS:
-        for controller in get_args(ControllerName):
+        for controller in CONTROLLERS:
             words = ("--controller", controller, *PLAN, "--seed", str(seed))
             named[f"{controller}-plan-seed{seed}"] = words
         for name, arguments in ABLATIONS.items():
@@ -102,7 +101,6 @@ def remake(options: EvidenceOptions) -> None:
             for or was made by other code.
     """
     console = Console(stderr=True)
-    check_jobs(options.jobs)
     for name, arguments in trainings().items():
         say(console, f"run {name}")
         _train(name, arguments)
@@ -112,7 +110,7 @@ def remake(options: EvidenceOptions) -> None:
             file.unlink()
     if options.train_only:
         return
-    for controller in get_args(ControllerName):
+    for controller in CONTROLLERS:
         shipped = _ship(controller, options.jobs, console)
         _make_rivals(controller, shipped, options.jobs, console)
     learning_curves(RUNS).savefig(REPOSITORY / "docs" / "images" / "learning.png")

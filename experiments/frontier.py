@@ -16,27 +16,32 @@ import dataclasses
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from experiments.figures import frontier_figure
-from agents.seeds import TEST, TUNING
+from experiments.seeds import TEST, TUNING
 from experiments.shipped import PRETRAINED, judged_config
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
-from icub_jump_env.evaluation.statistics.difference import Difference
 from icub_jump_env.evaluation.episodes.failures import failure_of
-from icub_jump_env.evaluation.report.output import check_writable, save_figure, say, show
-from icub_jump_env.evaluation.episodes.parallel import check_jobs
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.series import Series
+from icub_jump_env.evaluation.quantities import CM, commands, number, seeds
+from icub_jump_env.evaluation.report.output import (
+    check_writable,
+    new_table,
+    say,
+    show,
+    write_figures,
+)
+from icub_jump_env.evaluation.statistics.difference import Difference
 from icub_jump_env.evaluation.statistics.summary import Summary
-from icub_jump_env.evaluation.quantities import CM
 from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
 
 Episodes = Sequence[Episode]
@@ -87,13 +92,13 @@ class Point:
     summary: Summary
 
     def __str__(self) -> str:
-        return f"{CM * self.jump_height:g} cm after {CM * self.displacement:g} cm"
+        height, displacement = (commands(x, x) for x in (self.jump_height, self.displacement))
+        return f"{height} after {displacement}"
 
 
 def run_frontier(options: FrontierOptions) -> None:
     """Run the grid, choose, and let the chosen ones meet the policy."""
     console, progress = Console(), Console(stderr=True)
-    check_jobs(options.jobs)
     if options.plot is not None:
         check_writable("plot", options.plot, folder=True)
     names = (f"{options.controller}.safetensors", f"{options.controller}-constant.safetensors")
@@ -104,9 +109,9 @@ def run_frontier(options: FrontierOptions) -> None:
     cells = [(BASELINE, displacement) for displacement in DISPLACEMENTS]
     cells += [(constant, own), (policy, own)]
 
-    def jumps(contender: Contender, command: float, displacement: float, seeds: range) -> Episodes:
+    def jumps(contender: Contender, command: float, displacement: float, used: range) -> Episodes:
         jump = dataclasses.replace(config, jump_height=command, com_displacement=displacement)
-        episodes = Series(jump, seeds, contender).complete(options.jobs, progress)
+        episodes = Series(jump, used, contender).complete(options.jobs, progress)
         return [judged(episode) for episode in episodes]
 
     points = [
@@ -116,8 +121,8 @@ def run_frontier(options: FrontierOptions) -> None:
         for episodes in [jumps(contender, command, displacement, _GRID_SEEDS)]
     ]
     if options.plot is not None:
-        file = save_figure(options.plot, "frontier.png", frontier_figure(points))
-        say(progress, f"wrote {file}")
+        figures = {"frontier.png": partial(frontier_figure, points)}
+        write_figures(options.plot, figures, progress)
     show(console, render(points))
     ours, shifted = (
         next(p for p in points if p.contender is contender and p.jump_height == POLICY_COMMAND)
@@ -128,7 +133,7 @@ def run_frontier(options: FrontierOptions) -> None:
         return jumps(point.contender, point.jump_height, point.displacement, TEST)
 
     learned, fixed = meet(ours), meet(shifted)
-    say(console, f"seeds {TEST[0]} to {TEST[-1]}")
+    say(console, seeds(TEST))
     say(console, f"policy, {ours}: {_words(learned)}")
     say(console, f"constant shift, {shifted}: {_words(fixed)}")
     say(console, f"  policy against it: {Difference.of(learned, fixed)}")
@@ -172,36 +177,32 @@ def strongest(baselines: Sequence[Point], policy: Point) -> dict[str, Point]:
 
 def render(points: Sequence[Point]) -> Table:
     """The table of the grid."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("command, cm", "policy", "displacement, cm"):
-        table.add_column(column)
-    for column in ("landed, %", "success, %", "rise, cm", "soles, cm"):
-        table.add_column(column, justify="right")
+    names, numbers = ("command, cm", "policy", "displacement, cm"), ("landed, %", "success, %")
+    table = new_table(len(names), *names, *numbers, "rise, cm", "soles, cm")
     for point, following in zip(points, [*points[1:], None], strict=True):
         summary = point.summary
         table.add_row(
             f"{CM * point.jump_height:g}",
             point.contender.name,
             f"{CM * point.displacement:g}",
-            f"{100 * summary.landed.share:.0f}",
-            f"{100 * summary.success.share:.0f}",
-            f"{CM * summary.mean_rise:.2f}",
-            f"{CM * summary.mean_sole_height:.2f}",
+            number(summary.landed.share, "%"),
+            number(summary.success.share, "%"),
+            number(summary.mean_rise, "cm"),
+            number(summary.mean_sole_height, "cm"),
             end_section=following is None or following.jump_height != point.jump_height,
         )
     table.caption = (
-        f"seeds {_GRID_SEEDS[0]} to {_GRID_SEEDS[-1]}; success: landed after at least "
+        f"{seeds(_GRID_SEEDS)}; success: landed after at least "
         f"{CM * MIN_HEIGHT_RATIO * POLICY_COMMAND:g} cm"
     )
-    table.caption_justify = "left"
     return table
 
 
 def _words(episodes: Episodes) -> str:
     summary = Summary.of(episodes)
     return (
-        f"success {summary.success}, rise {CM * summary.mean_rise:.2f} cm, "
-        f"soles {CM * summary.mean_sole_height:.2f} cm"
+        f"success {summary.success}, rise {number(summary.mean_rise, 'cm')} cm, "
+        f"soles {number(summary.mean_sole_height, 'cm')} cm"
     )
 
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from agents.environment import acting_steps
-from agents.seeds import TUNING
+from experiments.seeds import TUNING
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.report.output import progress_display
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.evaluation.report.output import progress_display
 from icub_jump_env.policy import NetworkPolicy, Policy, ReplayPolicy
 
 FORWARD = tuple(np.round(np.arange(0.0, 0.81, 0.1), 3))

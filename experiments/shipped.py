@@ -1,4 +1,4 @@
-"""What is shipped in agents/pretrained, and the jumps to judge it by."""
+"""What the trainings leave, what is shipped of it, and the jumps to judge it by."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from agents.options import TASK
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.contender import Contender, as_trained
 
-PRETRAINED = Path(__file__).parent / "pretrained"
-"""Policies."""
+REPOSITORY = Path(__file__).parents[1]
 
-RUNS = PRETRAINED / "runs"
+PRETRAINED = REPOSITORY / "agents" / "pretrained"
+"""Shipped policies."""
+
+RUNS = REPOSITORY / "experiments" / "runs"
 """The best policy of every training, and its learning curve."""
 
 CURVE_SUFFIX = ".curve.json"

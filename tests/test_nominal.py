@@ -7,8 +7,8 @@ import pytest
 from conftest import jump
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.statistics.paper import PAPER as PAPERS
 from icub_jump_env.evaluation.episodes.rollout import make_env
+from icub_jump_env.evaluation.statistics.paper import PAPER as PAPERS
 from icub_jump_env.robot import facts
 
 PAPER = PAPERS["velocity"]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import importlib
 import io
 import json
 import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args
+from typing import Any, NoReturn, TypeVar, get_args
 
 import tyro
 from rich.console import Console
@@ -19,9 +20,6 @@ from rich.console import Console
 from icub_jump_env.errors import ICubJumpError, PolicyMismatchError
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.opengl import import_mujoco
-
-if TYPE_CHECKING:
-    from icub_jump_env.evaluation.episodes.contender import Contender
 
 T = TypeVar("T")
 
@@ -148,11 +146,12 @@ def _evaluate(arguments: Sequence[str]) -> None:
             except PolicyMismatchError as error:
                 raise ICubJumpError(f"{contender.name}: {error}") from error
     console, progress = Console(), Console(stderr=True)
-    _run_mode(options, contenders, console, progress)
+    mode = importlib.import_module(f"icub_jump_env.evaluation.modes.{options.mode}")
+    mode.run(options, contenders, console, progress)
     if options.video is not None:
         policy = contenders[0].policy
         record_video(options.video, options.config, options.seed, progress, policy)
-        say(console, f"wrote {options.video}")
+        say(progress, f"wrote {options.video}")
 
 
 def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
@@ -172,43 +171,6 @@ def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
         # A range of commands is for this mode alone.
         return EvalOptions(config=config, compare=tuple(found["compare"]))
     return EvalOptions(config=config)
-
-
-def _run_mode(
-    options: EvalOptions, contenders: Sequence[Contender], console: Console, progress: Console
-) -> None:
-    match options.mode:
-        case "statistics":
-            from icub_jump_env.evaluation.modes.statistics import run_statistics
-
-            run_statistics(options, contenders[0], console, progress)
-        case "compare":
-            from icub_jump_env.evaluation.modes.compare import run_compare
-
-            run_compare(options, contenders, console, progress)
-        case "study":
-            from icub_jump_env.evaluation.modes.study import run_study
-
-            run_study(options, console, progress)
-        case "sweep":
-            from icub_jump_env.evaluation.modes.sweep import run_sweep
-
-            run_sweep(options, console, progress)
-        case "view":
-            from icub_jump_env.evaluation.modes.view import view
-
-            view(options.config, options.seed, console, policy=contenders[0].policy)
-        case "report":
-            from icub_jump_env.evaluation.report.output import say
-            from icub_jump_env.evaluation.modes.report import write_report
-
-            assert options.report is not None  # else it were another mode
-            file = write_report(options.report, options.config, options.seed, progress)
-            say(console, f"wrote {file}")
-        case _:
-            from icub_jump_env.evaluation.modes.nominal import print_nominal
-
-            print_nominal(options, contenders[0], console, progress)
 
 
 def _one_line(complaint: str) -> str:

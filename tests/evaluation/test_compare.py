@@ -13,12 +13,12 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation import compare, series
+from icub_jump_env.evaluation.episodes.failures import Failure
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.evaluation.figures.compare import compare_figure
 from icub_jump_env.evaluation.modes.compare import (
     render,
 )
-from icub_jump_env.evaluation.figures.compare import compare_figure
-from icub_jump_env.evaluation.episodes.failures import Failure
-from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.statistics.summary import Rate
 
 

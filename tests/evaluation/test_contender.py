@@ -360,5 +360,7 @@ def test_a_series_is_completed_from_its_log(monkeypatch, tmp_path):
     series = Series(JumpConfig(stand_time=0.0), range(2))
     episodes = series.complete(1, QUIET)
     assert [episode.seed for episode in episodes] == [0, 1]
-    monkeypatch.setattr("icub_jump_env.evaluation.episodes.series.run_jobs", lambda work, jobs: iter(work))
+    monkeypatch.setattr(
+        "icub_jump_env.evaluation.episodes.series.run_jobs", lambda work, jobs: iter(work)
+    )
     assert series.complete(1, QUIET) == episodes

@@ -8,7 +8,11 @@ import pytest
 from contenders import episode, outcomes
 from scipy.stats import binom, multinomial
 
-from icub_jump_env.evaluation.statistics.difference import Difference, bootstrap_interval, paired_interval
+from icub_jump_env.evaluation.statistics.difference import (
+    Difference,
+    bootstrap_interval,
+    paired_interval,
+)
 
 
 class TestDifference:

@@ -17,11 +17,11 @@ from icub_jump_env.evaluation import cli, series, statistics
 from icub_jump_env.evaluation.episodes.contender import BASELINE
 from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.episodes.log import EpisodeLog
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.evaluation.figures.statistics import statistics_figure
+from icub_jump_env.evaluation.modes.statistics import replay_arguments
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.report.output import strict_json
-from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
-from icub_jump_env.evaluation.modes.statistics import replay_arguments
-from icub_jump_env.evaluation.figures.statistics import statistics_figure
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.simulation.randomization import Randomization
 

@@ -10,9 +10,9 @@ import pytest
 from scipy.stats import trim_mean
 
 from agents import ablations, shipped
+from agents.options import TASK
 from experiments.ablations import AblationOptions, compare_trainings, runs_interval
 from experiments.figures import learning_curves
-from agents.options import TASK
 from experiments.rivals import constant_shift
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode

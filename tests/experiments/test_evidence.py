@@ -7,8 +7,8 @@ import pytest
 from tiny_run import ARGUMENTS, train, written
 
 from agents import evidence, rivals, training
-from experiments.evidence import EvidenceError, EvidenceOptions, remake, trainings
 from agents.options import TrainOptions
+from experiments.evidence import EvidenceError, EvidenceOptions, remake, trainings
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy
 

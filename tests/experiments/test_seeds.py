@@ -4,9 +4,9 @@ import itertools
 
 from agents import seeds
 from agents.checkpoints import segment_seeds
-from experiments.evidence import ABLATION_SEEDS, HEADLINE_SEEDS
 from agents.options import TrainOptions
 from agents.training import MOST_CHECKPOINTS
+from experiments.evidence import ABLATION_SEEDS, HEADLINE_SEEDS
 
 
 def test_tuning_selection_test_and_training_share_no_episode():

@@ -15,6 +15,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
 from icub_jump_env.policy import BASELINE, Policy
+from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
 from icub_jump_env.snapshot import Snapshot
 
 Frame = NDArray[np.uint8]
@@ -55,6 +56,13 @@ def make_env(config: JumpConfig) -> ICubJumpEnv:
 def traced(config: JumpConfig) -> JumpConfig:
     """The same jump, stepped once per control tick; with a zero action nothing else changes."""
     return dataclasses.replace(config, agent_frequency=config.control_rate)
+
+
+def planned(config: JumpConfig) -> ComTrajectory:
+    """The vertical CoM trajectory that a configuration with a single command asks for."""
+    return plan_com_trajectory(
+        config.commanded_height, config.com_displacement, config.com_scaling
+    )
 
 
 def run_episode(

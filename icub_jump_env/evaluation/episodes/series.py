@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 from dataclasses import dataclass
@@ -13,10 +14,11 @@ from rich.markup import escape
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender
 from icub_jump_env.evaluation.episodes.log import EpisodeLog
-from icub_jump_env.evaluation.report.output import progress_display, say
 from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
-from icub_jump_env.evaluation.report.provenance import provenance, source, versions
 from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.quantities import commands
+from icub_jump_env.evaluation.report.output import progress_display, say
+from icub_jump_env.evaluation.report.provenance import provenance, source, versions
 from icub_jump_env.files import strict_json
 from icub_jump_env.simulation.sensor_models import SensorConfig
 
@@ -73,9 +75,10 @@ class Series:
             name = f"jumping, {escape(self.contender.name)}"
             task = display.add_task(name, total=total, completed=total - len(missing))
             try:
-                for _, episode in run_jobs(work, jobs):
-                    log.append(episode)
-                    display.advance(task)
+                with contextlib.closing(run_jobs(work, jobs)) as results:
+                    for _, episode in results:
+                        log.append(episode)
+                        display.advance(task)
             except BaseException:
                 kept = f"{len(log.episodes)} of {total} episodes are in {log.path}"
                 say(progress, f"{kept}; {remedy}")
@@ -102,25 +105,24 @@ class Series:
             ]
         )
         digest = hashlib.sha256(asked.encode()).hexdigest()[:8]
-        height = heights(self.config).replace(" ", "")
-        words = (self.config.controller, self.contender.name, height, ranges(self.config), digest)
+        height = commands(*self.config.jump_heights).replace(" ", "")
+        words = (self.config.controller, self.contender.name, height, world(self.config), digest)
         return Path("results") / f"{'-'.join(words)}.jsonl"
+
+
+def world(config: JumpConfig) -> str:
+    """The randomisation, for titles."""
+    return config.randomization if isinstance(config.randomization, str) else "custom"
+
+
+def varies(config: JumpConfig) -> bool:
+    """Whether anything differs between the episodes of a configuration."""
+    low, high = config.jump_heights
+    drawn = config.randomization_config.varies or low < high
+    return drawn or config.sensor_config != SensorConfig()
 
 
 def warn_if_alike(config: JumpConfig, progress: Console) -> None:
     """Say so where nothing differs between episodes."""
-    low, high = config.jump_heights
-    drawn = config.randomization_config.varies or low < high
-    if not drawn and config.sensor_config == SensorConfig():
+    if not varies(config):
         say(progress, "nothing is random here: all episodes will be alike")
-
-
-def heights(config: JumpConfig) -> str:
-    """The command, for titles."""
-    low, high = (100 * height for height in config.jump_heights)
-    return f"{low:g} cm" if low == high else f"{low:g} to {high:g} cm"
-
-
-def ranges(config: JumpConfig) -> str:
-    """The randomisation, for titles."""
-    return config.randomization if isinstance(config.randomization, str) else "custom"

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.figures.style import CONTENDERS, Figure, panels
+from icub_jump_env.evaluation.quantities import CM, PERCENT
 from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_labels
-from icub_jump_env.evaluation.quantities import CM
 from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
-
-_COLORS = ("0.55", "tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 
 
 def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
@@ -21,16 +19,15 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
     Args:
         episodes: The episodes of each contender, by its name.
     """
-    figure = Figure(figsize=(9.0, 3.8), dpi=120, layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, ((left, right),) = panels((9.0, 3.8), columns=2)
     shift = 0.8 / len(episodes)
     for number, (name, series) in enumerate(episodes.items()):
-        color = _COLORS[number % len(_COLORS)]
+        color = CONTENDERS[number % len(CONTENDERS)]
         groups = by_command(series)
         rates = [Summary.of(group).success for group in groups.values()]
         places = np.arange(len(groups)) + (number - (len(episodes) - 1) / 2) * shift
-        shares = np.array([100 * rate.share for rate in rates])
-        bounds = np.array([rate.interval for rate in rates]).T * 100
+        shares = np.array([PERCENT * rate.share for rate in rates])
+        bounds = np.array([rate.interval for rate in rates]).T * PERCENT
         errors = np.abs(bounds - shares)
         left.bar(places, shares, 0.9 * shift, yerr=errors, color=color, label=name, capsize=2)
         names = [text.removesuffix(" cm") for text in command_labels(series).values()]
@@ -56,6 +53,4 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
     right.set(xlabel="command (cm)", ylabel="CoM rise (cm)")
     left.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     right.legend(frameon=False, fontsize=8)
-    for axis in (left, right):
-        axis.spines[["top", "right"]].set_visible(False)
     return figure

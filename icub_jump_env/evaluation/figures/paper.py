@@ -5,73 +5,72 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from icub_jump_env.config import CONTROL_RATES, ControllerName, JumpConfig
-from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode, traced
-from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
+from icub_jump_env.evaluation.episodes.rollout import (
+    Episode,
+    make_env,
+    planned,
+    run_episode,
+    traced,
+)
+from icub_jump_env.evaluation.figures.style import (
+    ACCENT,
+    DESIRED,
+    MEASURED,
+    Figure,
+    describe,
+    mark_takeoff,
+    panels,
+)
+from icub_jump_env.evaluation.quantities import CM, commands
 from icub_jump_env.robot import facts
 from icub_jump_env.snapshot import Snapshot
-
-MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"
 
 Trace = Sequence[Snapshot]
 
 
-def draw_figures(
-    folder: Path, config: JumpConfig, episodes: Mapping[str, Episode], seed: int
-) -> list[Path]:
-    """Write the figures as PNG files.
+def paper_figures(
+    config: JumpConfig, episodes: Mapping[str, Episode], seed: int
+) -> dict[str, Callable[[], Figure]]:
+    """What draws each figure, by its file name.
 
     Args:
-        folder: Where to write them; made if missing.
         config: The jump's configuration.
         episodes: Traced episodes ``with`` and ``without`` the momentum constraint.
         seed: Their seed.
-
-    Returns:
-        The files written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    ours = episodes["with" if config.momentum_control else "without"]
-    figure_number = _LAUNCH[config.controller].figure.lower().replace(". ", "")
-    robot = realistic(config)
-    with contextlib.closing(make_env(traced(robot))) as env:
-        robot_episode = run_episode(env, seed, trace=True)
-    files = []
-    for name, figure in (
-        ("fig1_com_reference", com_reference_figure(config)),
-        (f"{figure_number}_launch", launch_figure(config, ours.trace)),
-        ("fig4_realistic", robot_figure(robot, robot_episode.trace)),
-        ("fig6_base_pitch", base_pitch_figure(episodes)),
-    ):
-        file = folder / f"{name}.png"
-        figure.savefig(file)
-        files.append(file)
-    return files
+    trace = episodes["with" if config.momentum_control else "without"].trace
+    number = _LAUNCH[config.controller].figure.lower().replace(". ", "")
+    return {
+        "fig1_com_reference.png": partial(com_reference_figure, config),
+        f"{number}_launch.png": partial(launch_figure, config, trace),
+        "fig4_realistic.png": lambda: robot_figure(config, realistic_episode(config, seed)),
+        "fig6_base_pitch.png": partial(base_pitch_figure, episodes),
+    }
 
 
 def com_reference_figure(config: JumpConfig) -> Figure:
     """Fig. 1: vertical CoM reference, velocity and acceleration."""
-    trajectory = _trajectory(config)
+    trajectory = planned(config)
     time = np.linspace(0.0, trajectory.duration, 400)
     samples = [trajectory.sample(t) for t in time]
-    figure, (velocity, acceleration) = _figure(1, 2, (8.0, 3.2))
+    figure, ((velocity, acceleration),) = panels((8.0, 3.2), columns=2)
     velocity.plot(time, [s.velocity for s in samples], color=DESIRED)
-    _label(velocity, "vertical CoM velocity", "m/s")
+    describe(velocity, "vertical CoM velocity", "m/s")
     acceleration.plot(time, [s.acceleration for s in samples], color=DESIRED)
-    _label(acceleration, "vertical CoM acceleration", "m/s²")
+    describe(acceleration, "vertical CoM acceleration", "m/s²")
     figure.suptitle(
-        f"Fig. 1: CoM reference, {config.commanded_height * 100:.3g} cm jump, "
-        f"{trajectory.displacement * 100:.3g} cm displacement"
+        f"Fig. 1: CoM reference, {commands(*config.jump_heights)} jump, "
+        f"{CM * trajectory.displacement:.3g} cm displacement"
     )
     return figure
 
@@ -97,10 +96,10 @@ _LAUNCH: dict[ControllerName, _Shown] = {
 def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
     """Fig. 2 (joint velocities) or Fig. 3 (joint torques) and CoM height, desired and measured."""
     shown = _LAUNCH[config.controller]
-    figure, (*joints, height) = _figure(1, 4, (13.0, 3.4))
+    figure, ((*joints, height),) = panels((13.0, 3.4), columns=4)
     _draw_joints(joints, config, trace)
     _draw_height(height, config, trace)
-    duration = _trajectory(config).duration
+    duration = planned(config).duration
     figure.suptitle(
         f"{shown.figure}: {config.controller} approach, take-off commanded at {duration:.2f} s"
     )
@@ -118,15 +117,22 @@ def realistic(config: JumpConfig) -> JumpConfig:
     )
 
 
-def robot_figure(config: JumpConfig, trace: Trace) -> Figure:
+def realistic_episode(config: JumpConfig, seed: int) -> Episode:
+    """The traced episode of :func:`realistic`."""
+    with contextlib.closing(make_env(traced(realistic(config)))) as env:
+        return run_episode(env, seed, trace=True)
+
+
+def robot_figure(config: JumpConfig, episode: Episode) -> Figure:
     """Fig. 4: the jump of the real robot, here simulated with realistic actuators and sensors.
 
     As in the paper the CoM is the one estimated from the encoders as if the feet stood
     still, which means nothing after take-off; the true one is drawn beside it.
     """
-    figure, (*joints, height) = _figure(1, 4, (13.0, 3.4))
-    _draw_joints(joints, config, trace)
-    _draw_height(height, config, trace, estimated=True)
+    figure, ((*joints, height),) = panels((13.0, 3.4), columns=4)
+    robot = realistic(config)
+    _draw_joints(joints, robot, episode.trace)
+    _draw_height(height, robot, episode.trace, estimated=True)
     figure.suptitle(
         "Fig. 4: simulation with realistic actuators and sensors, velocity approach "
         "(the paper shows the real robot)"
@@ -137,7 +143,7 @@ def robot_figure(config: JumpConfig, trace: Trace) -> Figure:
 def _draw_joints(axes: Sequence[Axes], config: JumpConfig, trace: Trace) -> None:
     shown = _LAUNCH[config.controller]
     time = np.array([s.time for s in trace])
-    launch = time <= _trajectory(config).duration
+    launch = time <= planned(config).duration
     for axis, joint in zip(axes, ("ankle_pitch", "knee", "hip_pitch"), strict=True):
         index = facts.JOINT_INDEX[f"l_{joint}"]
         measured = np.array([getattr(s, shown.quantity)[index] for s in trace])
@@ -149,14 +155,14 @@ def _draw_joints(axes: Sequence[Axes], config: JumpConfig, trace: Trace) -> None
         if float(np.abs(measured[launch]).max()) > 0.8 * limit:
             sign = np.sign(measured[launch][-1])
             axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":")
-        _label(axis, f"left {joint.replace('_', ' ')}", shown.unit)
+        describe(axis, f"left {joint.replace('_', ' ')}", shown.unit)
     styles = (("measured", MEASURED, "-"), ("desired", DESIRED, "--"), ("limit", ACCENT, ":"))
     handles = [Line2D([], [], color=color, ls=ls, label=label) for label, color, ls in styles]
     axes[0].legend(handles=handles, frameon=False)
 
 
 def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool = False) -> None:
-    duration = _trajectory(config).duration
+    duration = planned(config).duration
     early = [s for s in trace if s.time <= duration + 0.6]
     time = [s.time for s in early]
     true = [s.com[2] for s in early]
@@ -166,16 +172,16 @@ def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool =
     else:
         axis.plot(time, true, color=MEASURED)
     axis.plot(time, [s.com_reference[2] for s in early], color=DESIRED, ls="--")
-    axis.axvline(duration, color=ACCENT, lw=0.8, ls=":")
+    mark_takeoff(axis, duration)
     axis.annotate("T", (duration, min(true)), color=ACCENT, ha="left")
-    _label(axis, "CoM height", "m")
+    describe(axis, "CoM height", "m")
     if estimated:
         axis.legend(frameon=False)
 
 
 def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
     """Fig. 6: base pitch with and without the momentum constraint."""
-    figure, (axis,) = _figure(1, 1, (6.5, 3.6))
+    figure, ((axis,),) = panels((6.5, 3.6))
     takeoffs = [episode.jump["takeoff_time"] for episode in episodes.values()]
     takeoff = min((t for t in takeoffs if not math.isnan(t)), default=math.inf)
     fallen = [e.trace[-1].time for e in episodes.values() if e.outcome == "fell"]
@@ -198,31 +204,12 @@ def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
                 ha="right",
             )
     if math.isfinite(takeoff):
-        axis.axvline(takeoff, color=ACCENT, lw=0.8, ls=":")
+        mark_takeoff(axis, takeoff)
         bottom = axis.get_ylim()[0]
         axis.annotate(
             "take-off", (takeoff, bottom), (4, 4), textcoords="offset points", color=ACCENT
         )
-    _label(axis, "", "deg")
+    describe(axis, "", "deg")
     axis.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     figure.suptitle("Fig. 6: base pitch (positive: forward)")
     return figure
-
-
-def _trajectory(config: JumpConfig) -> ComTrajectory:
-    return plan_com_trajectory(
-        config.commanded_height, config.com_displacement, config.com_scaling
-    )
-
-
-def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=size, dpi=150, layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False)
-    return figure, list(axes.flat)
-
-
-def _label(axis: Axes, title: str, unit: str) -> None:
-    axis.set_title(title, fontsize=10)
-    axis.set_xlabel("time (s)")
-    axis.set_ylabel(unit)
-    axis.spines[["top", "right"]].set_visible(False)

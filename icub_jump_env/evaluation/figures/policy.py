@@ -1,16 +1,21 @@
-"""The picture of a policy's jump: where it moves the CoM reference, and what comes of it."""
+"""A policy's jump: where it moves the CoM reference, and what comes of it."""
 
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.figures.paper import ACCENT, DESIRED, MEASURED
-from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.episodes.rollout import Episode, planned
+from icub_jump_env.evaluation.figures.style import (
+    ACCENT,
+    DESIRED,
+    MEASURED,
+    Figure,
+    describe,
+    mark_takeoff,
+    panels,
+)
 from icub_jump_env.evaluation.quantities import CM, DEG
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 
 _AFTER = 0.8
 """Shown after the commanded take-off (s)."""
@@ -24,11 +29,8 @@ def policy_figure(config: JumpConfig, policy: Episode, baseline: Episode) -> Fig
         policy: Its traced episode with the policy.
         baseline: The same without.
     """
-    takeoff = plan_com_trajectory(
-        config.commanded_height, config.com_displacement, config.com_scaling
-    ).duration
-    figure = Figure(figsize=(11.0, 3.4), dpi=150, layout="constrained")
-    offset, height, pitch = figure.subplots(1, 3)
+    takeoff = planned(config).duration
+    figure, ((offset, height, pitch),) = panels((11.0, 3.4), columns=3)
     pairs = [
         (ours.time, ours.com_reference - theirs.com_reference)
         for ours, theirs in zip(policy.trace, baseline.trace, strict=False)
@@ -51,11 +53,6 @@ def policy_figure(config: JumpConfig, policy: Episode, baseline: Episode) -> Fig
         (height, "CoM height", "m"),
         (pitch, "base pitch (positive: forward)", "deg"),
     ):
-        _finish(axis, title, unit, takeoff)
+        describe(axis, title, unit)
+        mark_takeoff(axis, takeoff)
     return figure
-
-
-def _finish(axis: Axes, title: str, unit: str, takeoff: float) -> None:
-    axis.axvline(takeoff, color=ACCENT, lw=0.8, ls=":")
-    axis.set(title=title, xlabel="time (s)", ylabel=unit)
-    axis.spines[["top", "right"]].set_visible(False)

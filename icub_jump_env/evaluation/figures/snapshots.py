@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.rollout import Episode, Frame, make_env, run_episode, traced
+from icub_jump_env.evaluation.figures.style import INK
 
 STRIP_WIDTH = 1600
 """Width of the strip (pixels)."""
@@ -24,7 +25,6 @@ _CROP = (slice(10, 450), slice(60, 500))
 
 _ENDS = {"stood": "Stands", "fell": "Falls"}
 _DPI = 100
-_INK = "#24303c"
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def draw_strip(shots: Sequence[Shot]) -> Figure:
         ):
             figure.text(
                 center, y / height, text, ha="center", va="center",
-                color=_INK, fontsize=size, fontweight=weight,
+                color=INK, fontsize=size, fontweight=weight,
             )  # fmt: skip
     return figure
 

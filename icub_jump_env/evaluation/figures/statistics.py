@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from icub_jump_env.evaluation.episodes.failures import Failure
-from icub_jump_env.evaluation.figures.paper import ACCENT, DESIRED, MEASURED
 from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.figures.style import ACCENT, DESIRED, MEASURED, Figure, panels
 from icub_jump_env.evaluation.quantities import CM, DEG
 from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
 
@@ -38,8 +37,7 @@ def statistics_figure(episodes: Sequence[Episode]) -> Figure:
     # A length of 1 on the x axis: a centimetre, or the command.
     unit = {e.seed: 1 / CM if alike else e.jump_height for e in episodes}
     command = CM * episodes[0].jump_height if alike else 1.0
-    figure = Figure(figsize=(6.5, 4.0), dpi=120, layout="constrained")
-    axis = figure.subplots()
+    figure, ((axis,),) = panels((6.5, 4.0))
     for kind, marker in _MARKERS.items():
         shown = [e for e in episodes if e.failure is kind]
         if shown:
@@ -53,15 +51,9 @@ def statistics_figure(episodes: Sequence[Episode]) -> Figure:
                 label=f"{kind or 'success'}: {len(shown)}",
             )
     axis.axvline(command, color=ACCENT, lw=0.8, label="command")
-    axis.axvline(
-        MIN_HEIGHT_RATIO * command,
-        color=ACCENT,
-        lw=0.8,
-        ls=":",
-        label="least for a success",
-    )
+    least = MIN_HEIGHT_RATIO * command
+    axis.axvline(least, color=ACCENT, lw=0.8, ls=":", label="least for a success")
     axis.set_xlabel("CoM rise (cm)" if alike else "CoM rise / commanded height")
     axis.set_ylabel("rotation in flight (deg)")
-    axis.spines[["top", "right"]].set_visible(False)
     axis.legend(frameon=False, fontsize=8)
     return figure

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from icub_jump_env.config import ControllerName
-from icub_jump_env.evaluation.figures.paper import DESIRED, MEASURED
-from icub_jump_env.evaluation.modes.study import CONTROLLERS, CaseResult
-from icub_jump_env.evaluation.quantities import CM, DEG
+from icub_jump_env.evaluation.figures.style import CONTROLLER, Figure, panels
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, DEG
 
-_COLORS: dict[ControllerName, str] = {"velocity": MEASURED, "torque": DESIRED}
+if TYPE_CHECKING:
+    from icub_jump_env.evaluation.modes.study import CaseResult
+
 _ROWS = (("flight_height", CM, "CoM rise (cm)"), ("flight_rotation", DEG, "rotation (deg)"))
 
 
@@ -29,9 +30,8 @@ def realism_figure(results: Sequence[CaseResult]) -> Figure:
         One column per group; how many landed shows in the markers.
     """
     groups = [(name, list(members)) for name, members in groupby(results, lambda r: r.case.group)]
-    figure = Figure(figsize=(16.0, 6.4), dpi=120, layout="constrained")
-    axes = figure.subplots(
-        len(_ROWS), len(groups), sharex="col", sharey="row", squeeze=False,
+    figure, axes = panels(
+        (16.0, 6.4), len(_ROWS), len(groups), sharex="col", sharey="row",
         width_ratios=[len(members) for _, members in groups],
     )  # fmt: skip
     for column, (name, members) in enumerate(groups):
@@ -39,7 +39,6 @@ def realism_figure(results: Sequence[CaseResult]) -> Figure:
             axis = axes[row, column]
             for offset, controller in zip((-0.12, 0.12), CONTROLLERS, strict=True):
                 _points(axis, members, controller, metric, scale, offset)
-            axis.spines[["top", "right"]].set_visible(False)
             axis.grid(axis="y", color="0.9")
             if column == 0:
                 axis.set_ylabel(label)
@@ -59,7 +58,7 @@ def _points(
     scale: float,
     offset: float,
 ) -> None:
-    color = _COLORS[controller]
+    color = CONTROLLER[controller]
     for x, result in enumerate(members):
         summary = result.summaries[controller]
         low, middle, high = scale * np.array(summary.percentiles[metric])
@@ -74,7 +73,8 @@ def _points(
 
 def _legend() -> list[Line2D]:
     controllers = [
-        Line2D([], [], color=_COLORS[c], marker="o", label=f"{c} controller") for c in CONTROLLERS
+        Line2D([], [], color=CONTROLLER[c], marker="o", label=f"{c} controller")
+        for c in CONTROLLERS
     ]
     shares = [
         Line2D([], [], ls="", color="0.3", marker=marker, markerfacecolor=face, label=label)

@@ -2,54 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.contender import Contender
-from icub_jump_env.evaluation.statistics.difference import Difference
-from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.report.output import save_figure, say, show, write_json
-from icub_jump_env.evaluation.episodes.parallel import check_jobs
-from icub_jump_env.evaluation.report.provenance import command, provenance
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.episodes.series import Series, heights, ranges, warn_if_alike
+from icub_jump_env.evaluation.episodes.series import Series, warn_if_alike, world
+from icub_jump_env.evaluation.figures.compare import compare_figure
+from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.evaluation.quantities import PERCENT, commands, number, seeds
+from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
+from icub_jump_env.evaluation.statistics.difference import Difference
 from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_labels
-from icub_jump_env.evaluation.quantities import CM, DEG, number
+
+Arms = Mapping[str, Sequence[Episode]]
+"""Episodes by the name of their contender."""
 
 
-def run_compare(
+def run(
     options: EvalOptions, contenders: Sequence[Contender], console: Console, progress: Console
 ) -> None:
     """Run ``eval.py --compare``."""
-    check_jobs(options.jobs)
-    warn_if_alike(options.config, progress)
-    episodes = run_contenders(options, contenders, progress)
-    if options.json is not None:
-        write_json(options.json, report(episodes, options, contenders))
-        say(progress, f"wrote {options.json}")
-    if options.plot is not None:
-        from icub_jump_env.evaluation.figures.compare import compare_figure
-
-        file = save_figure(options.plot, "compare.png", compare_figure(episodes))
-        say(progress, f"wrote {file}")
-    config, seeds = options.config, _seeds(options)
+    config = options.config
+    if options.episodes is None and min(config.jump_heights) < max(config.jump_heights):
+        # A policy's card may bring the range: one episode is not what was asked for.
+        drawn = commands(*config.jump_heights)
+        raise ConfigError("episodes", None, f"a number: each draws its command of {drawn}")
+    warn_if_alike(config, progress)
+    arms = run_contenders(options, contenders, progress)
+    found = report(arms, contenders) | {"episodes": len(options.seeds)}
+    write_results(options, progress, found, {"compare.png": partial(compare_figure, arms)})
     say(
         console,
-        f"{heights(config)} jump, {config.controller} controller, randomization "
-        f"{ranges(config)}, seeds {seeds[0]} to {seeds[-1]} for each",
+        f"{commands(*config.jump_heights)} jump, {config.controller} controller, randomization "
+        f"{world(config)}, {seeds(options.seeds)} for each",
     )
-    show(console, render(episodes))
-    for name, done in episodes.items():
-        failures = Summary.of(done).failures.items()
-        counts = ", ".join(f"{len(seeds)} {kind}" for kind, seeds in failures)
+    show(console, render(arms))
+    for name, episodes in arms.items():
+        failures = Summary.of(episodes).failures.items()
+        counts = ", ".join(f"{len(failed)} {kind}" for kind, failed in failures)
         say(console, f"{name} failed: {counts or 'never'}")
     for ours, theirs in _pairs(contenders):
-        difference = Difference.of(episodes[ours], episodes[theirs])
+        difference = Difference.of(arms[ours], arms[theirs])
         say(console, f"{ours} against {theirs}: {difference}")
 
 
@@ -63,35 +63,25 @@ def run_contenders(
     options: EvalOptions, contenders: Sequence[Contender], progress: Console
 ) -> dict[str, list[Episode]]:
     """The episodes of each contender, by its name."""
-    episodes = {}
+    arms = {}
     for contender in contenders:
-        series = Series(options.config, _seeds(options), contender)
+        series = Series(options.config, options.seeds, contender)
         log = series.default_log()
         resume = options.resume and log.exists()
-        episodes[contender.name] = series.run(log, resume, options.jobs, progress)
-    return episodes
+        arms[contender.name] = series.run(log, resume, options.jobs, progress)
+    return arms
 
 
-def _seeds(options: EvalOptions) -> range:
-    return range(options.seed, options.seed + (options.episodes or 1))
-
-
-def report(
-    episodes: dict[str, list[Episode]], options: EvalOptions, contenders: Sequence[Contender]
-) -> dict[str, Any]:
+def report(arms: Arms, contenders: Sequence[Contender]) -> dict[str, Any]:
     """Everything that was found, for ``--json``."""
     return {
-        "mode": "compare",
-        "command": command(),
-        "episodes": options.episodes or 1,
-        **provenance(options.config, options.seed),
         "contenders": {
             contender.name: {
                 **contender.identity,
-                "all": Summary.of(episodes[contender.name]).as_dict(),
+                "all": Summary.of(arms[contender.name]).as_dict(),
                 "by_command": [
-                    {"jump_height": (low / CM, high / CM), **Summary.of(group).as_dict()}
-                    for (low, high), group in by_command(episodes[contender.name]).items()
+                    {"jump_height": command, **Summary.of(group).as_dict()}
+                    for command, group in by_command(arms[contender.name]).items()
                 ],
             }
             for contender in contenders
@@ -100,8 +90,8 @@ def report(
             {
                 "ours": ours,
                 "theirs": theirs,
-                "all": vars(Difference.of(episodes[ours], episodes[theirs])),
-                "by_command": _differences_by_command(episodes[ours], episodes[theirs]),
+                "all": vars(Difference.of(arms[ours], arms[theirs])),
+                "by_command": _differences_by_command(arms[ours], arms[theirs]),
             }
             for ours, theirs in _pairs(contenders)
         ],
@@ -113,61 +103,47 @@ def _differences_by_command(
 ) -> list[dict[str, Any]]:
     groups = zip(by_command(ours).items(), by_command(theirs).values(), strict=True)
     return [
-        {"jump_height": (low / CM, high / CM), **vars(Difference.of(our_group, their_group))}
-        for ((low, high), our_group), their_group in groups
+        {"jump_height": command, **vars(Difference.of(our_group, their_group))}
+        for (command, our_group), their_group in groups
     ]
 
 
-def render(episodes: dict[str, list[Episode]]) -> Table:
+def render(arms: Arms) -> Table:
     """The table for the terminal: one row per command range and contender."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("command", "policy"):
-        table.add_column(column, no_wrap=True)
-    for column in (
-        "success",
-        "95 % interval",
-        "landed",
-        "rise, cm",
-        "soles, cm",
-        "off by, cm",
-        "rotation, deg",
-        "landing, N",
-        "work, J",
-    ):
-        table.add_column(column, justify="right", no_wrap=True)
-    grouped = {name: by_command(series) for name, series in episodes.items()}
-    labels = command_labels(next(iter(episodes.values())))
-    rows = [
+    table = new_table(
+        2, "command", "policy", "success", "95 % interval", "landed", "rise, cm", "soles, cm",
+        "off by, cm", "rotation, deg", "landing, N", "work, J",
+    )  # fmt: skip
+    grouped = {name: by_command(episodes) for name, episodes in arms.items()}
+    rows: list[tuple[str, Arms]] = [
         (label, {name: groups[command] for name, groups in grouped.items()})
-        for command, label in labels.items()
+        for command, label in command_labels(next(iter(arms.values()))).items()
     ]
     if len(rows) > 1:
-        rows.append(("all", episodes))
+        rows.append(("all", arms))
     for label, group in rows:
-        for row, (name, series) in enumerate(group.items()):
+        for row, (name, episodes) in enumerate(group.items()):
             last = row == len(group) - 1
             table.add_row(
-                label if row == 0 else "", escape(name), *_cells(series), end_section=last
+                label if row == 0 else "", escape(name), *_cells(episodes), end_section=last
             )
     table.caption = (
         "success: landed after at least 0.7 of the command; rise of the CoM, height of the soles "
         "and distance from the command: means of all episodes, the rest medians"
     )
-    table.caption_justify = "left"
     return table
 
 
 def _cells(episodes: Sequence[Episode]) -> list[str]:
     summary = Summary.of(episodes)
-    low, high = summary.success.interval
     return [
-        f"{100 * summary.success.share:.1f} %",
-        f"{100 * low:.1f} to {100 * high:.1f}",
-        f"{100 * summary.landed.share:.1f} %",
-        number(CM * summary.mean_rise, "cm"),
-        number(CM * summary.mean_sole_height, "cm"),
-        number(CM * summary.mean_height_error, "cm"),
-        number(DEG * summary.median_rotation, "deg"),
+        f"{PERCENT * summary.success.share:.1f} %",
+        summary.success.bounds,
+        f"{PERCENT * summary.landed.share:.1f} %",
+        number(summary.mean_rise, "cm"),
+        number(summary.mean_sole_height, "cm"),
+        number(summary.mean_height_error, "cm"),
+        number(summary.median_rotation, "deg"),
         number(summary.median("landing_force"), "N"),
         number(summary.median("joint_work"), "J"),
     ]

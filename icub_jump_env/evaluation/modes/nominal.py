@@ -5,23 +5,38 @@ The other one is the jump without the momentum constraint; of a policy, the base
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.table import Table
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender
+from icub_jump_env.evaluation.episodes.rollout import (
+    Episode,
+    make_env,
+    planned,
+    run_episode,
+    traced,
+)
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.report.output import progress_display, save_figure, say, show, write_json
-from icub_jump_env.evaluation.report.provenance import command, provenance
-from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode, traced
-from icub_jump_env.evaluation.quantities import comparison_rows, render_table, verdict
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
+from icub_jump_env.evaluation.quantities import CM, commands
+from icub_jump_env.evaluation.report.output import (
+    new_table,
+    progress_display,
+    say,
+    show,
+    write_results,
+)
+from icub_jump_env.evaluation.statistics.paper import Row, comparison_rows, verdict
+
+if TYPE_CHECKING:
+    from icub_jump_env.evaluation.figures.style import Figure
 
 
 @dataclass(frozen=True)
@@ -55,97 +70,80 @@ def run_nominal(
     """
     if contender.is_baseline:
         switched = dataclasses.replace(config, momentum_control=not config.momentum_control)
-        jumps = [(_momentum(c), c, contender) for c in (config, switched)]
+        named = ((c, "with" if c.momentum_control else "without") for c in (config, switched))
+        jumps = [(name, c, contender) for c, name in named]
     else:
         jumps = [("policy", config, contender), ("baseline", config, BASELINE)]
+    arms = []
     with progress_display(console) as progress:
         task = progress.add_task("jumping", total=2)
-        arms = []
         for name, arm_config, acting in jumps:
-            env = make_env(traced(arm_config) if trace else arm_config)
             hold = arm_config.controls_per_step if trace else 1
-            episode = run_episode(env, seed, acting.policy, trace, hold=hold)
+            with contextlib.closing(make_env(traced(arm_config) if trace else arm_config)) as env:
+                episode = run_episode(env, seed, acting.policy, trace, hold=hold)
             arms.append(Arm(name, arm_config, acting, episode))
-            env.close()
             progress.advance(task)
     return arms[0], arms[1]
 
 
-def _momentum(config: JumpConfig) -> str:
-    return "with" if config.momentum_control else "without"
-
-
-def print_nominal(
-    options: EvalOptions, contender: Contender, console: Console, progress: Console
+def run(
+    options: EvalOptions, contenders: Sequence[Contender], console: Console, progress: Console
 ) -> None:
     """Run eval.py without a mode."""
-    config = options.config
+    config, (contender, *_) = options.config, contenders
     if options.plot is not None and contender.is_baseline:
         from icub_jump_env.evaluation.figures.paper import realistic
 
         realistic(config)  # refuses before any work what Fig. 4 cannot be drawn of
     arms = run_nominal(config, options.seed, options.plot is not None, progress, contender)
     ours, other = (arm.episode for arm in arms)
-    wrote = []
-    if options.json is not None:
-        write_json(options.json, nominal_report(arms, options.seed))
-        wrote.append(options.json)
-    if options.plot is not None:
-        draw = _draw_paper if contender.is_baseline else _draw_policy
-        wrote += draw(arms, options, progress)
     rows = comparison_rows(config, ours, other)
-    title = f"{config.commanded_height * 100:g} cm jump, {config.controller} controller"
-    paper = "; the paper's: 4 cm after 11 cm"
+    write_results(options, progress, report(arms, rows), _figures(arms, options))
+    title = f"{commands(*config.jump_heights)} jump, {config.controller} controller"
     if contender.is_baseline:
-        show(
-            console,
-            render_table(
-                rows, title + paper, f"{'no' if config.momentum_control else 'with'} eq. 3d"
-            ),
-        )
-        say(console, verdict(rows, config.momentum_control))
+        column = f"{'no' if config.momentum_control else 'with'} eq. 3d"
     else:
-        launch = plan_com_trajectory(
-            config.commanded_height, config.com_displacement, config.com_scaling
-        )
-        acting = f" with {contender.name}, after {launch.displacement * 100:.3g} cm"
-        show(console, render_table(rows, title + acting + paper, "baseline"))
-    for file in wrote:
-        say(console, f"wrote {file}")
+        launch = f"{CM * planned(config).displacement:.3g} cm"
+        title, column = f"{title} with {contender.name}, after {launch}", "baseline"
+    show(console, render_table(rows, f"{title}; the paper's: 4 cm after 11 cm", column))
+    if contender.is_baseline:
+        say(console, verdict(ours, other, config.momentum_control))
 
 
-def _draw_paper(arms: Sequence[Arm], options: EvalOptions, progress: Console) -> list[Path]:
-    from icub_jump_env.evaluation.figures.paper import draw_figures
+def _figures(arms: Sequence[Arm], options: EvalOptions) -> dict[str, Callable[[], Figure]]:
+    """What draws the paper's figures; of a policy, what it does."""
+    if options.plot is None:
+        return {}
+    config, ours, other = options.config, *(arm.episode for arm in arms)
+    if not arms[0].contender.is_baseline:
+        from icub_jump_env.evaluation.figures.policy import policy_figure
+
+        return {"policy.png": partial(policy_figure, config, ours, other)}
+    from icub_jump_env.evaluation.figures.paper import paper_figures
     from icub_jump_env.evaluation.figures.snapshots import snapshot_strip
 
-    assert options.plot is not None  # else nothing is to be drawn
-    episodes = {arm.name: arm.episode for arm in arms}
-    files = draw_figures(options.plot, options.config, episodes, options.seed)
-    try:
-        strip = snapshot_strip(options.config, options.seed)
-    except MissingDependencyError as error:
-        say(progress, f"left out Fig. 5: {error}")
-    else:
-        files.append(options.plot / "fig5_snapshots.png")
-        strip.savefig(files[-1])
-    return files
-
-
-def _draw_policy(arms: Sequence[Arm], options: EvalOptions, progress: Console) -> list[Path]:
-    from icub_jump_env.evaluation.figures.policy import policy_figure
-
-    assert options.plot is not None  # else nothing is to be drawn
-    ours, other = (arm.episode for arm in arms)
-    return [save_figure(options.plot, "policy.png", policy_figure(options.config, ours, other))]
-
-
-def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
-    """Everything eval.py found, for ``--json``."""
-    ours, other = arms
     return {
-        "mode": "nominal",
-        "command": command(),
-        **provenance(ours.config, seed),
+        **paper_figures(config, {arm.name: arm.episode for arm in arms}, options.seed),
+        "fig5_snapshots.png": partial(snapshot_strip, config, options.seed),
+    }
+
+
+def render_table(rows: Sequence[Row], title: str, other: str) -> Table:
+    """The table for the terminal; ``other`` names the last column."""
+    table = new_table(1, "", "paper", "ours", "difference", other, title=title)
+    for row in rows:
+        table.add_row(f"{row.quantity}, {row.unit}", *row.cells)
+    table.caption = (
+        "paper: simulated heights, commanded take-off, ballistic height of the real robot"
+    )
+    if "3d" in other:
+        table.caption += "; eq. 3d: the momentum constraint"
+    return table
+
+
+def report(arms: Sequence[Arm], rows: Sequence[Row]) -> dict[str, Any]:
+    """Everything eval.py found, for ``--json``."""
+    return {
         "arms": {
             arm.name: {
                 "policy": arm.contender.identity,
@@ -157,8 +155,5 @@ def nominal_report(arms: Sequence[Arm], seed: int) -> dict[str, Any]:
             }
             for arm in arms
         },
-        "comparison": [
-            dataclasses.asdict(row)
-            for row in comparison_rows(ours.config, ours.episode, other.episode)
-        ],
+        "comparison": [dataclasses.asdict(row) for row in rows],
     }

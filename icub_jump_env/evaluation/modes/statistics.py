@@ -5,53 +5,38 @@ from __future__ import annotations
 import dataclasses
 import shlex
 from collections.abc import Sequence
+from functools import partial
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.contender import Contender
-from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.report.output import save_figure, say, show, write_json
-from icub_jump_env.evaluation.episodes.parallel import check_jobs
-from icub_jump_env.evaluation.report.provenance import command, provenance
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.episodes.series import Series, heights, ranges, warn_if_alike
+from icub_jump_env.evaluation.episodes.series import Series, warn_if_alike, world
+from icub_jump_env.evaluation.figures.statistics import statistics_figure
+from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.evaluation.quantities import QUANTITIES, commands, number, seeds
+from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
 from icub_jump_env.evaluation.statistics.summary import Summary
-from icub_jump_env.evaluation.quantities import CM, QUANTITIES, number
 from icub_jump_env.files import strict_json
 
 
-def run_statistics(
-    options: EvalOptions, contender: Contender, console: Console, progress: Console
+def run(
+    options: EvalOptions, contenders: Sequence[Contender], console: Console, progress: Console
 ) -> None:
     """Run eval.py with several episodes or a randomised world."""
-    config, episodes = options.config, options.episodes or 1
-    check_jobs(options.jobs)
-    warn_if_alike(config, progress)
-    series = Series(config, range(options.seed, options.seed + episodes), contender)
-    done = series.run(
-        options.results or series.default_log(), options.resume, options.jobs, progress
+    contender = contenders[0]
+    warn_if_alike(options.config, progress)
+    series = Series(options.config, options.seeds, contender)
+    log = options.results or series.default_log()
+    episodes = series.run(log, options.resume, options.jobs, progress)
+    asked = {"episodes": len(episodes), "policy": contender.identity}
+    found = asked | Summary.of(episodes).as_dict()
+    write_results(
+        options, progress, found, {"statistics.png": partial(statistics_figure, episodes)}
     )
-    if options.json is not None:
-        asked = {
-            "mode": "statistics",
-            "command": command(),
-            "episodes": episodes,
-            "policy": contender.identity,
-        }
-        write_json(
-            options.json,
-            asked | provenance(config, options.seed) | Summary.of(done).as_dict(),
-        )
-        say(progress, f"wrote {options.json}")
-    if options.plot is not None:
-        from icub_jump_env.evaluation.figures.statistics import statistics_figure
-
-        file = save_figure(options.plot, "statistics.png", statistics_figure(done))
-        say(progress, f"wrote {file}")
-    title, table, lines = render(done, options, contender)
+    title, table, lines = render(episodes, options, contender)
     say(console, title)
     show(console, table)
     say(console, lines)
@@ -60,36 +45,33 @@ def run_statistics(
 def render(
     episodes: Sequence[Episode], options: EvalOptions, contender: Contender
 ) -> tuple[str, Table, str]:
-    """What the terminal shows: title, metrics, rates and failures."""
+    """What the terminal shows: title, metrics, rates and failures.
+
+    Of a single episode there is nothing but its values.
+    """
     config, summary = options.config, Summary.of(episodes)
     title = (
-        f"{heights(config)} jump, {config.controller} controller, {contender.name}, "
-        f"randomization {ranges(config)}, seeds {options.seed} to "
-        f"{options.seed + len(episodes) - 1}"
+        f"{commands(*config.jump_heights)} jump, {config.controller} controller, "
+        f"{contender.name}, randomization {world(config)}, {seeds(options.seeds)}"
     )
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("", no_wrap=True)
-    for column in ("10 %", "median", "90 %"):
-        table.add_column(column, justify="right", no_wrap=True)
-    for name, metric, unit, scale, _ in QUANTITIES:
+    several = len(episodes) > 1
+    table = new_table(1, "", *(("10 %", "median", "90 %") if several else ("value",)))
+    for name, metric, unit in QUANTITIES:
         if metric != "landed":
-            values = (number(scale * value, unit) for value in summary.percentiles[metric])
-            table.add_row(f"{name}, {unit}", *values)
-    lines = [
-        f"landed and stands: {summary.landed}",
-        f"mean rise: {number(CM * summary.mean_rise, 'cm')} cm",
-        f"success: {summary.success}",
-    ]
-    for kind, seeds in summary.failures.items():
-        shown = ", ".join(map(str, seeds[:10])) + (", ..." if len(seeds) > 10 else "")
-        lines.append(f"{kind}: {len(seeds)} (seeds {shown})")
-    failed = [
-        episode for kind in summary.failures for episode in episodes if episode.failure is kind
-    ]
-    if failed:
+            low, middle, high = (number(value, unit) for value in summary.percentiles[metric])
+            table.add_row(f"{name}, {unit}", *((low, middle, high) if several else (middle,)))
+    lines = [f"landed and stands: {summary.landed}"]
+    if several:
+        lines.append(f"mean rise: {number(summary.mean_rise, 'cm')} cm")
+    lines.append(f"success: {summary.success}")
+    for kind, failed in summary.failures.items():
+        shown = ", ".join(map(str, failed[:10])) + (", ..." if len(failed) > 10 else "")
+        lines.append(f"{kind}: {len(failed)} (seeds {shown})" if several else f"failure: {kind}")
+    failures = [e for kind in summary.failures for e in episodes if e.failure is kind]
+    if failures:
         # In the range of commands it drew this one.
-        jump = dataclasses.replace(config, jump_height=failed[0].jump_height)
-        words = replay_arguments(jump, failed[0].seed)
+        jump = dataclasses.replace(config, jump_height=failures[0].jump_height)
+        words = replay_arguments(jump, failures[0].seed)
         if options.policy is not None:
             words += f" --policy {shlex.quote(str(options.policy))}"
         lines.append(f"replay one: python eval.py {words} --view")

@@ -10,28 +10,28 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from functools import partial
+from typing import Any
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from icub_jump_env.config import ControllerName, JumpConfig
-from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
-from icub_jump_env.evaluation.report.output import save_figure, say, show, write_json
+from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
-from icub_jump_env.evaluation.report.provenance import command, provenance
 from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.episodes.series import varies
+from icub_jump_env.evaluation.figures.study import realism_figure
+from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
+from icub_jump_env.evaluation.quantities import CONTROLLERS, commands, number
+from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
 from icub_jump_env.evaluation.statistics.summary import Summary
-from icub_jump_env.evaluation.quantities import DEG
 from icub_jump_env.simulation.actuators.config import ACTUATORS
 from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
 from icub_jump_env.simulation.sensor_models import SensorConfig, SensorError
 
 _LEVER = 0.05
 """Moment error (Nm) that goes with a force error of 1 N, as in the realistic preset."""
-
-CONTROLLERS: tuple[ControllerName, ...] = get_args(ControllerName)
 
 
 @dataclass(frozen=True)
@@ -124,22 +124,18 @@ class CaseResult:
     case: Case
     summaries: dict[ControllerName, Summary]
 
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        summaries = {name: summary.as_dict() for name, summary in self.summaries.items()}
+        return dataclasses.asdict(self.case) | summaries
 
-def run_study(options: EvalOptions, console: Console, progress: Console) -> None:
+
+def run(options: EvalOptions, _: Sequence[Contender], console: Console, progress: Console) -> None:
     """Run ``eval.py --study realism``."""
     results = run_cases(options, progress)
-    wrote = []
-    if options.json is not None:
-        write_json(options.json, study_report(results, options))
-        wrote.append(options.json)
-    if options.plot is not None:
-        from icub_jump_env.evaluation.figures.study import realism_figure
-
-        file = save_figure(options.plot, "realism.png", realism_figure(results))
-        wrote.append(file)
+    found = {"cases": [result.as_dict() for result in results]}
+    write_results(options, progress, found, {"realism.png": partial(realism_figure, results)})
     show(console, render(results, options))
-    for path in wrote:
-        say(console, f"wrote {path}")
     if options.plot is None:
         say(progress, "for the picture add --plot FOLDER")
 
@@ -165,23 +161,17 @@ def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
 
 def _seeds(config: JumpConfig, options: EvalOptions) -> range:
     """One episode is enough where nothing is random."""
-    random = config.sensor_config != SensorConfig() or config.randomization_config.varies
-    episodes = (options.episodes or STUDY_EPISODES) if random else 1
+    episodes = (options.episodes or STUDY_EPISODES) if varies(config) else 1
     return range(options.seed, options.seed + episodes)
 
 
 def render(results: Sequence[CaseResult], options: EvalOptions) -> Table:
     """The table for the terminal."""
-    table = Table(
-        title=f"Realism study, {options.config.commanded_height * 100:g} cm jump",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-    )
-    table.add_column("", no_wrap=True)
-    for controller in CONTROLLERS:
-        for quantity in ("rise", "rot.", "landed"):
-            table.add_column(f"{controller[:3]}.\n{quantity}", justify="right", no_wrap=True)
+    headings = [
+        f"{c[:3]}.\n{quantity}" for c in CONTROLLERS for quantity in ("rise", "rot.", "landed")
+    ]
+    title = f"Realism study, {commands(*options.config.jump_heights)} jump"
+    table = new_table(1, "", *headings, title=title)
     group = ""
     for result in results:
         if result.case.group != group:
@@ -194,30 +184,15 @@ def render(results: Sequence[CaseResult], options: EvalOptions) -> Table:
         "vel., tor.: velocity and torque controller; rise of the CoM in cm and rotation in "
         "flight in deg: medians; landed: share in %"
     )
-    table.caption_justify = "left"
     return table
 
 
 def _cells(summary: Summary) -> tuple[str, str, str]:
-    rise = summary.median("flight_height")
-    rotation = summary.median("flight_rotation")
-    return f"{100 * rise:.2f}", f"{DEG * rotation:.1f}", f"{100 * summary.landed.share:.0f}"
-
-
-def study_report(results: Sequence[CaseResult], options: EvalOptions) -> dict[str, Any]:
-    """Everything the study found, for ``--json``."""
-    return {
-        "mode": "study",
-        "command": command(),
-        **provenance(options.config, options.seed),
-        "cases": [
-            {
-                **dataclasses.asdict(result.case),
-                **{c: result.summaries[c].as_dict() for c in CONTROLLERS},
-            }
-            for result in results
-        ],
-    }
+    return (
+        number(summary.median("flight_height"), "cm"),
+        number(summary.median("flight_rotation"), "deg"),
+        number(summary.landed.share, "%"),
+    )
 
 
 def _offset(force: float) -> SensorConfig:

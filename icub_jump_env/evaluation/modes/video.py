@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from pathlib import Path
 
@@ -10,8 +11,8 @@ from rich.console import Console
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError, MissingDependencyError
-from icub_jump_env.evaluation.report.output import progress_display
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.evaluation.report.output import progress_display
 from icub_jump_env.policy import BASELINE, Policy
 from icub_jump_env.simulation.opengl import open_context
 
@@ -67,9 +68,8 @@ def record_video(
         render_mode="rgb_array",
         stand_time=min(config.stand_time, AFTER_LANDING),
     )
-    env = make_env(config)
     frames = []
-    with progress_display(console) as progress:
+    with progress_display(console) as progress, contextlib.closing(make_env(config)) as env:
         task = progress.add_task("recording", total=None)
 
         def shoot(env: ICubJumpEnv) -> None:
@@ -77,7 +77,6 @@ def record_video(
             progress.advance(task)
 
         run_episode(env, seed, policy, on_step=shoot)
-    env.close()
     # Complete or not at all: a full disk or an interrupt leaves an earlier video as it was.
     part = file.with_name(f".{file.stem}.part{file.suffix}")
     try:

@@ -9,20 +9,22 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from typing import Any, Literal
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import MissingDependencyError
+from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode, traced
+from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.evaluation.report.output import say
 from icub_jump_env.policy import BASELINE, Policy
 from icub_jump_env.simulation.viewers.screen import KEYS, Caption, Command, Screen
 from icub_jump_env.simulation.viewers.window import WindowScreen, check_window
-
-Place = Literal["auto", "browser", "window"]
 
 SLOW_MOTION = 0.25
 """Simulated seconds per second at the start."""
@@ -101,45 +103,33 @@ class _Quit(Exception):  # noqa: N818
     """The user has seen enough."""
 
 
+@dataclass
 class Show:
-    """The episode of :func:`run_episode` on a screen, which slows it down and repeats it."""
+    """The episode of :func:`run_episode` on a screen, which slows it down and repeats it.
 
-    def __init__(
-        self,
-        env: ICubJumpEnv,
-        seed: int,
-        screen: Screen,
-        playback: Playback,
-        enough: threading.Event,
-        clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
-        policy: Policy = BASELINE,
-        hold: int = 1,
-    ) -> None:
-        """Prepare it.
+    Attributes:
+        env: The environment.
+        seed: Seed of the episode.
+        screen: Where to show it.
+        playback: How fast.
+        enough: Another way to quit.
+        clock: Tells the time (s).
+        sleep: Waits for a time (s).
+        policy: What acts.
+        hold: Steps that an action is held.
+    """
 
-        Args:
-            env: The environment.
-            seed: Seed of the episode.
-            screen: Where to show it.
-            playback: How fast.
-            enough: Another way to quit.
-            clock: Tells the time (s).
-            sleep: Waits for a time (s).
-            policy: What acts.
-            hold: Steps that an action is held.
-        """
-        self._env = env
-        self._seed = seed
-        self._policy = policy
-        self._hold = hold
-        self._screen = screen
-        self._playback = playback
-        self._enough = enough
-        self._clock = clock
-        self._sleep = sleep
-        self._refreshed = -math.inf
-        self._scene: Caption = {}
+    env: ICubJumpEnv
+    seed: int
+    screen: Screen
+    playback: Playback
+    enough: threading.Event
+    clock: Callable[[], float] = time.monotonic
+    sleep: Callable[[float], None] = time.sleep
+    policy: Policy = BASELINE
+    hold: int = 1
+    _refreshed: float = field(default=-math.inf, init=False)
+    _scene: Caption = field(default_factory=dict, init=False)
 
     def run(self) -> Episode | None:
         """Show the episode as often as the user likes, until the user quits.
@@ -151,12 +141,12 @@ class Show:
         while True:
             try:
                 episode = run_episode(
-                    self._env, self._seed, self._policy, on_step=self._present, hold=self._hold
+                    self.env, self.seed, self.policy, on_step=self._present, hold=self.hold
                 )
                 self._scene["phase"] = episode.outcome
                 while True:
                     self._attend()
-                    self._sleep(FRAME)
+                    self.sleep(FRAME)
             except _Replay:
                 continue
             except _Quit:
@@ -165,10 +155,10 @@ class Show:
     def _present(self, env: ICubJumpEnv) -> None:
         """Show the present state once it is due."""
         instant = env.data.time
-        while (delay := self._playback.delay(instant)) > 0.0:
+        while (delay := self.playback.delay(instant)) > 0.0:
             self._attend()
-            self._sleep(min(delay, FRAME))
-        self._screen.show(env.data)
+            self.sleep(min(delay, FRAME))
+        self.screen.show(env.data)
         self._scene = {"time": f"{instant:.3f} s", "phase": env.snapshot().phase}
         self._attend()
 
@@ -177,27 +167,25 @@ class Show:
 
         MuJoCo's viewer may take a frame's time to refresh: not for each control tick.
         """
-        if self._enough.is_set():
+        if self.enough.is_set():
             raise _Quit
-        if self._clock() - self._refreshed < FRAME:
+        if self.clock() - self._refreshed < FRAME:
             return
-        slower = round(1.0 / self._playback.speed)
+        slower = round(1.0 / self.playback.speed)
         speed = "real time" if slower == 1 else f"1/{slower} of real time"
-        paused = ", paused" if self._playback.paused else ""
-        commands = self._screen.refresh(self._scene | {"speed": speed + paused})
-        self._refreshed = self._clock()
+        paused = ", paused" if self.playback.paused else ""
+        commands = self.screen.refresh(self._scene | {"speed": speed + paused})
+        self._refreshed = self.clock()
         for command in commands:
-            self._playback.obey(command)
+            self.playback.obey(command)
         if Command.QUIT in commands:
             raise _Quit
         if Command.REPLAY in commands:
             raise _Replay
 
 
-def in_browser(place: Place) -> bool:
-    """Whether to show the jump in the browser: if asked to, or if there can be no window."""
-    if place != "auto":
-        return place == "browser"
+def in_browser() -> bool:
+    """Whether there can be no window, so that the jump is shown in the browser."""
     if sys.platform == "darwin":  # only mjpython can open a window there
         return True
     try:
@@ -207,33 +195,26 @@ def in_browser(place: Place) -> bool:
     return False
 
 
-def open_browser_screen(model: Any, port: int, console: Console) -> Screen:
-    """Serve a page with the jump and say where it is.
-
-    Raises:
-        ConfigError: If the port is taken.
-        MissingDependencyError: If MuJoCo Studio is missing.
-    """
-    try:
-        from icub_jump_env.simulation.viewers.browser import BrowserScreen
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"viewing in the browser needs MuJoCo Studio ({error}): pip install mujoco"
-        ) from error
-    screen = BrowserScreen(model, port)
-    console.print(f"open {screen.address} in a browser on this machine", soft_wrap=True)
-    console.print(f"{KEYS}, Quit or Ctrl-C: end", soft_wrap=True)
-    return screen
-
-
-def open_window_screen(model: Any, console: Console) -> Screen:
-    """Open a window and say how to use it.
+def open_screen(model: Any, browser: bool, console: Console) -> Screen:
+    """Open a window or serve a page, and say how to use it.
 
     Raises:
         MissingDependencyError: If that is impossible.
     """
-    screen = WindowScreen(model)
-    console.print(f"{KEYS}, close the window or Ctrl-C: end", soft_wrap=True)
+    if not browser:
+        screen: Screen = WindowScreen(model)
+        end = "close the window"
+    else:
+        try:
+            from icub_jump_env.simulation.viewers.browser import BrowserScreen
+        except ImportError as error:
+            raise MissingDependencyError(
+                f"viewing in the browser needs MuJoCo Studio ({error}): pip install mujoco"
+            ) from error
+        screen = page = BrowserScreen(model)
+        say(console, f"open {page.address} in a browser on this machine")
+        end = "Quit"
+    say(console, f"{KEYS}, {end} or Ctrl-C: end")
     return screen
 
 
@@ -256,40 +237,35 @@ def ctrl_c() -> Iterator[threading.Event]:
         signal.signal(signal.SIGINT, previous)
 
 
-def view(
-    config: JumpConfig,
-    seed: int,
-    console: Console,
-    place: Place = "auto",
-    port: int = 0,
-    policy: Policy = BASELINE,
+def run(
+    options: EvalOptions, contenders: Sequence[Contender], console: Console, _: Console
 ) -> None:
-    """Show the jump live until the user quits.
+    """Run ``eval.py --view``."""
+    view(options.config, options.seed, console, policy=contenders[0].policy)
+
+
+def view(config: JumpConfig, seed: int, console: Console, policy: Policy = BASELINE) -> None:
+    """Show the jump live until the user quits: in a window if there can be one.
 
     Args:
         config: The jump.
         seed: Seed of the episode.
         console: Where the address and the keys are written.
-        place: Where to show it: in a window, in the browser, or in whichever there can be.
-        port: Port of the browser's page; 0 takes a free one.
         policy: What acts.
 
     Raises:
-        ConfigError: If the port is taken.
-        MissingDependencyError: If the jump cannot be shown there.
+        MissingDependencyError: If the jump cannot be shown.
     """
-    browser = in_browser(place)
+    browser = in_browser()
     # Any mode loads the meshes; this one opens nothing before it is asked for a picture. A step
     # per control tick makes slow motion smooth.
     env = make_env(dataclasses.replace(traced(config), render_mode="rgb_array"))
-    with contextlib.closing(env), ctrl_c() as enough:
-        if browser:
-            screen = open_browser_screen(env.model, port, console)
-        else:
-            screen = open_window_screen(env.model, console)
-        with contextlib.closing(screen):
-            # A page takes seconds to load: there the user starts the jump.
-            playback = Playback(paused=browser)
-            Show(
-                env, seed, screen, playback, enough, policy=policy, hold=config.controls_per_step
-            ).run()
+    with (
+        contextlib.closing(env),
+        ctrl_c() as enough,
+        contextlib.closing(open_screen(env.model, browser, console)) as screen,
+    ):
+        # A page takes seconds to load: there the user starts the jump.
+        playback = Playback(paused=browser)
+        hold = config.controls_per_step
+        Show(env, seed, screen, playback, enough, policy=policy, hold=hold).run()

@@ -1,30 +1,51 @@
-"""Writing results: complete or not at all."""
+"""The console, and files: complete or not at all."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich import box
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import Progress, ProgressColumn
 from rich.table import Table
 
-from icub_jump_env.errors import ConfigError
+from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.evaluation.report.provenance import command, provenance
 from icub_jump_env.files import strict_json, write_file
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from icub_jump_env.evaluation.figures.style import Figure
+    from icub_jump_env.evaluation.options import EvalOptions
 
 
-def progress_display(console: Console) -> Progress:
+def progress_display(console: Console, *columns: ProgressColumn) -> Progress:
     """A progress display that vanishes when done, and says nothing to a file or pipe."""
-    return Progress(console=console, transient=True, disable=not console.is_terminal)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 def say(console: Console, text: str) -> None:
     """Print a line as it is: not wrapped, and nothing in it taken for markup."""
     console.print(text, soft_wrap=True, markup=False, highlight=False)
+
+
+def new_table(names: int, *columns: str, title: str | None = None) -> Table:
+    """A table without rows.
+
+    Args:
+        names: How many of its columns hold names; those with numbers come after.
+        columns: Their headings.
+        title: What stands above.
+    """
+    table = Table(
+        title=title, title_justify="left", caption_justify="left",
+        box=box.SIMPLE_HEAD, pad_edge=False,
+    )  # fmt: skip
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="left" if number < names else "right", no_wrap=True)
+    return table
 
 
 def show(console: Console, table: Table) -> None:
@@ -59,13 +80,42 @@ def check_writable(field: str, path: Path, folder: bool = False) -> None:
         raise ConfigError(field, str(path), "a path in an existing, writable folder")
 
 
-def save_figure(folder: Path, name: str, figure: Figure) -> Path:
-    """Write a figure into a folder, which is made if need be; returns the file."""
-    folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / name)
-    return folder / name
-
-
 def write_json(path: Path, content: Any) -> None:
     """Write strict JSON as :func:`write_file` does; NaN, which JSON lacks, becomes null."""
     write_file(path, (strict_json(content, indent=2) + "\n").encode())
+
+
+def write_figures(
+    folder: Path, figures: Mapping[str, Callable[[], Figure]], console: Console
+) -> None:
+    """Draw pictures into a folder, which is made if need be; those without OpenGL are left out."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, draw in figures.items():
+        try:
+            draw().savefig(folder / name)
+        except MissingDependencyError as error:
+            say(console, f"left out {name}: {error}")
+        else:
+            say(console, f"wrote {folder / name}")
+
+
+def write_results(
+    options: EvalOptions,
+    console: Console,
+    found: Mapping[str, Any],
+    figures: Mapping[str, Callable[[], Figure]],
+) -> None:
+    """Write what ``--json`` and ``--plot`` ask for, and say where.
+
+    Args:
+        options: What was asked for.
+        console: Where to say it.
+        found: What was found, for JSON.
+        figures: What draws each picture, by its file name.
+    """
+    if options.json is not None:
+        asked = {"mode": options.mode, "command": command()}
+        write_json(options.json, {**asked, **provenance(options.config, options.seed), **found})
+        say(console, f"wrote {options.json}")
+    if options.plot is not None:
+        write_figures(options.plot, figures, console)

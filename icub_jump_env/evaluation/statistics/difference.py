@@ -2,41 +2,41 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, bootstrap, norm
+from scipy.stats import binomtest
 
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.statistics.summary import CONFIDENCE
-from icub_jump_env.evaluation.quantities import CM
-
-Interval = tuple[float, float]
-
-_RESAMPLES = 9999
+from icub_jump_env.evaluation.quantities import PERCENT, number, spread
+from icub_jump_env.evaluation.statistics.intervals import (
+    Interval,
+    bootstrap_interval,
+    paired_interval,
+)
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One contender against another one on the same episodes.
+    """One contender against another one on the same episodes; intervals are of 95 %.
 
     Attributes:
+        pairs: Number of episodes.
         won: Episodes that it alone succeeded in.
         lost: Episodes that the other one alone succeeded in.
         p_value: Of McNemar's exact test: how likely won and lost are to differ as much by
             chance.
         success: Gain in the success rate (1 is all episodes).
-        success_interval: Its interval of 95 %, see :func:`paired_interval`.
+        success_interval: Its interval, see :func:`paired_interval`.
         rise: Gain in the mean flight height (m).
-        rise_interval: Its bootstrap interval of 95 %.
+        rise_interval: Its bootstrap interval.
         sole_height: Gain in the mean height of the soles (m).
-        sole_height_interval: Its bootstrap interval of 95 %.
+        sole_height_interval: Its bootstrap interval.
     """
 
+    pairs: int
     won: int
     lost: int
     p_value: float
@@ -63,6 +63,7 @@ class Difference:
             for metric in ("flight_height", "sole_height")
         )
         return cls(
+            pairs=len(gains),
             won=won,
             lost=lost,
             p_value=float(binomtest(won, won + lost).pvalue) if won + lost else 1.0,
@@ -75,57 +76,22 @@ class Difference:
         )
 
     def __str__(self) -> str:
-        low, high = (100 * bound for bound in self.success_interval)
+        points = f"{PERCENT * self.success:+.1f}"
+        rise, soles = (
+            f"{number(value, 'cm', signed=True)} cm" for value in (self.rise, self.sole_height)
+        )
+        if self.pairs == 1:
+            return f"success {points} points, rise {rise}, soles {soles} (a single episode)"
+        low, high = (PERCENT * bound for bound in self.success_interval)
         p = "p < 0.001" if self.p_value < 0.001 else f"p = {self.p_value:.3f}"
         return (
-            f"success {100 * self.success:+.1f} points (95 % interval {low:+.1f} to {high:+.1f}; "
+            f"success {points} points (95 % interval {low:+.1f} to {high:+.1f}; "
             f"won {self.won}, lost {self.lost}, McNemar {p}), "
-            f"rise {_centimetres(self.rise, self.rise_interval)}, "
-            f"soles {_centimetres(self.sole_height, self.sole_height_interval)}"
+            f"rise {rise} ({spread(*self.rise_interval, 'cm', signed=True)}), "
+            f"soles {soles} ({spread(*self.sole_height_interval, 'cm', signed=True)})"
         )
-
-
-def paired_interval(won: int, lost: int, pairs: int) -> Interval:
-    """Interval of 95 % of the difference of two paired rates.
-
-    Wald's with half a pair added to each of the four outcomes, which keeps its coverage
-    near 95 % also where few pairs differ, or none.
-
-    Reference: Agresti and Min, Simple improved confidence intervals for comparing matched
-    proportions, Statistics in Medicine 24, 2005.
-
-    Args:
-        won: Pairs that the first one alone succeeded in.
-        lost: Pairs that the second one alone succeeded in.
-        pairs: All pairs.
-    """
-    n = pairs + 2
-    middle = (won - lost) / n
-    variance = ((won + lost + 1) / n - middle**2) / n
-    half = float(norm.ppf((1 + CONFIDENCE) / 2)) * math.sqrt(variance)
-    return max(-1.0, middle - half), min(1.0, middle + half)
-
-
-def bootstrap_interval(values: NDArray[Any]) -> Interval:
-    """Percentile bootstrap interval of 95 % of the mean, the same at each call."""
-    if np.ptp(values) == 0.0:
-        return float(values[0]), float(values[0])
-    interval = bootstrap(
-        (values,),
-        np.mean,
-        n_resamples=_RESAMPLES,
-        confidence_level=CONFIDENCE,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return float(interval.low), float(interval.high)
 
 
 def _values(episodes: Sequence[Episode], metric: str) -> NDArray[np.float64]:
     """A height of each episode, zero where there was no flight."""
     return np.nan_to_num([float(episode.jump[metric]) for episode in episodes])
-
-
-def _centimetres(value: float, interval: Interval) -> str:
-    low, high = interval
-    return f"{CM * value:+.2f} cm ({CM * low:+.2f} to {CM * high:+.2f})"

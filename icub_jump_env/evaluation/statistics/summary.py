@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -10,18 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest, trim_mean
 
 from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.quantities import CM, QUANTITIES
+from icub_jump_env.evaluation.quantities import CM, PERCENT, QUANTITIES, commands
+from icub_jump_env.evaluation.statistics.intervals import Interval, wilson_interval
 
-CONFIDENCE = 0.95
-
-interquartile_mean = functools.partial(trim_mean, proportiontocut=0.25)
-"""Mean of the middle half, as reported of training seeds."""
-
-_METRICS = (*(metric for _, metric, *_ in QUANTITIES), "landing_force", "joint_work")
+_METRICS = (*(metric for _, metric, _ in QUANTITIES), "landing_force", "joint_work")
 
 
 @dataclass(frozen=True)
@@ -37,21 +31,27 @@ class Rate:
         return self.count / self.total
 
     @property
-    def interval(self) -> tuple[float, float]:
+    def interval(self) -> Interval:
         """Wilson interval of 95 %."""
-        interval = binomtest(self.count, self.total).proportion_ci(CONFIDENCE, method="wilson")
-        return float(interval.low), float(interval.high)
+        return wilson_interval(self.count, self.total)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {"count": self.count, "total": self.total, "interval": self.interval}
 
     def __str__(self) -> str:
-        low, high = self.interval
+        if self.total == 1:
+            return "yes" if self.count else "no"
         return (
-            f"{100 * self.share:.1f} % ({self.count} of {self.total}; "
-            f"95 % interval {100 * low:.1f} to {100 * high:.1f} %)"
+            f"{PERCENT * self.share:.1f} % ({self.count} of {self.total}; "
+            f"95 % interval {self.bounds} %)"
         )
+
+    @property
+    def bounds(self) -> str:
+        """The interval in percent; a dash for a single episode."""
+        low, high = self.interval
+        return "-" if self.total == 1 else f"{PERCENT * low:.1f} to {PERCENT * high:.1f}"
 
 
 @dataclass(frozen=True)
@@ -119,24 +119,29 @@ def _percentiles(values: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, 
     return float(p10), float(p50), float(p90)
 
 
-def command_range(jump_height: float) -> tuple[int, int]:
+Command = tuple[float, float]
+"""The whole centimetres that a command lies between (m)."""
+
+
+def command_range(jump_height: float) -> Command:
     """The whole centimetres that a command (m) lies between."""
     low = math.floor(CM * jump_height + 1e-9)
-    return low, low + 1
+    return low / CM, (low + 1) / CM
 
 
-def by_command(episodes: Sequence[Episode]) -> dict[tuple[int, int], list[Episode]]:
+def by_command(episodes: Sequence[Episode]) -> dict[Command, list[Episode]]:
     """Episodes by the centimetres that their command lies between, ascending."""
 
-    def key(episode: Episode) -> tuple[int, int]:
+    def key(episode: Episode) -> Command:
         return command_range(episode.jump_height)
 
     groups = itertools.groupby(sorted(episodes, key=key), key=key)
     return {command: list(group) for command, group in groups}
 
 
-def command_labels(episodes: Sequence[Episode]) -> dict[tuple[int, int], str]:
+def command_labels(episodes: Sequence[Episode]) -> dict[Command, str]:
     """What to call the groups of :func:`by_command`; a single command by itself."""
-    commands = {episode.jump_height for episode in episodes}
-    alone = f"{CM * min(commands):g} cm" if len(commands) == 1 else None
-    return {(low, high): alone or f"{low} to {high} cm" for low, high in by_command(episodes)}
+    groups, heights = by_command(episodes), [episode.jump_height for episode in episodes]
+    if min(heights) == max(heights):
+        return dict.fromkeys(groups, commands(min(heights), max(heights)))
+    return {command: commands(*command) for command in groups}
