@@ -16,7 +16,7 @@ from troubled_env import TroubledEnv
 from agents import workers
 from agents.vec_env import JumpVecEnv
 from icub_jump_env.errors import InvalidValueError
-from icub_jump_env.evaluation.episodes.parallel import WorkerError
+from icub_jump_env.evaluation.episodes.workers import WorkerError
 
 ACTION = np.zeros((2, 1), np.float32)
 

@@ -85,6 +85,10 @@ class TestDifference:
         assert "McNemar p < 0.001" in worse
         assert "rise -0.12 cm" in worse
 
+    def test_of_a_single_pair_there_is_nothing_but_its_values(self):
+        line = str(Difference.of(self.ours[:1], self.theirs[:1]))
+        assert line == ("success +100.0 points, rise +0.30 cm, soles +0.00 cm (a single episode)")
+
 
 class TestPairedInterval:
     def test_by_hand(self):

@@ -18,15 +18,15 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
-from icub_jump_env.evaluation import report
 from icub_jump_env.evaluation.figures.snapshots import (
     STRIP_WIDTH,
     Shot,
     draw_strip,
     take_snapshots,
 )
+from icub_jump_env.evaluation.modes import report
 from icub_jump_env.evaluation.modes.video import check_video
-from icub_jump_env.evaluation.quantities import comparison_rows
+from icub_jump_env.evaluation.statistics.paper import comparison_rows
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 

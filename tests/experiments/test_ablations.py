@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import trim_mean
 
-from agents import ablations, shipped
 from agents.options import TASK
+from experiments import ablations, shipped
 from experiments.ablations import AblationOptions, compare_trainings, runs_interval
 from experiments.figures import learning_curves
 from experiments.rivals import constant_shift

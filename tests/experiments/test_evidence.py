@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from tiny_run import ARGUMENTS, train, written
 
-from agents import evidence, rivals, training
+from agents import training
 from agents.options import TrainOptions
+from experiments import evidence, rivals
 from experiments.evidence import EvidenceError, EvidenceOptions, remake, trainings
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy

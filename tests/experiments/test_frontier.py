@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from agents import frontier, shipped
 from agents.options import TASK
+from experiments import frontier, shipped
 from experiments.frontier import FrontierOptions, Point, judged, run_frontier, strongest
 from experiments.rivals import constant_shift
 from icub_jump_env.errors import ConfigError

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents import rivals
 from agents.environment import acting_steps
 from agents.options import TASK
+from experiments import rivals
 from experiments.rivals import best_constant, constant_shift, open_loop
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode

@@ -2,10 +2,10 @@
 
 import itertools
 
-from agents import seeds
 from agents.checkpoints import segment_seeds
 from agents.options import TrainOptions
 from agents.training import MOST_CHECKPOINTS
+from experiments import seeds
 from experiments.evidence import ABLATION_SEEDS, HEADLINE_SEEDS
 
 

@@ -72,7 +72,7 @@ def test_video_is_recorded(offscreen, tmp_path):
 
 @pytest.mark.parametrize(
     ("mode", "backend", "remedy"),
-    [("human", "", "needs a display"), ("rgb_array", "glfw", "unset it to render with EGL")],
+    [("human", "", "that needs a display"), ("rgb_array", "glfw", "unset it to render with EGL")],
 )
 def test_without_a_display_the_error_names_the_remedy(mode, backend, remedy):
     program = (

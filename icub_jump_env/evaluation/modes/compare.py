@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -14,12 +13,14 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.series import Series, warn_if_alike, world
-from icub_jump_env.evaluation.figures.compare import compare_figure
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.quantities import PERCENT, commands, number, seeds
 from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
 from icub_jump_env.evaluation.statistics.difference import Difference
 from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_labels
+
+if TYPE_CHECKING:
+    from icub_jump_env.evaluation.figures.style import Figure
 
 Arms = Mapping[str, Sequence[Episode]]
 """Episodes by the name of their contender."""
@@ -37,7 +38,13 @@ def run(
     warn_if_alike(config, progress)
     arms = run_contenders(options, contenders, progress)
     found = report(arms, contenders) | {"episodes": len(options.seeds)}
-    write_results(options, progress, found, {"compare.png": partial(compare_figure, arms)})
+
+    def figure() -> Figure:
+        from icub_jump_env.evaluation.figures.compare import compare_figure
+
+        return compare_figure(arms)
+
+    write_results(options, progress, found, {"compare.png": figure})
     say(
         console,
         f"{commands(*config.jump_heights)} jump, {config.controller} controller, randomization "

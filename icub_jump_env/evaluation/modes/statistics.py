@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shlex
 from collections.abc import Sequence
-from functools import partial
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
@@ -14,12 +14,14 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.series import Series, warn_if_alike, world
-from icub_jump_env.evaluation.figures.statistics import statistics_figure
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.quantities import QUANTITIES, commands, number, seeds
 from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
 from icub_jump_env.evaluation.statistics.summary import Summary
 from icub_jump_env.files import strict_json
+
+if TYPE_CHECKING:
+    from icub_jump_env.evaluation.figures.style import Figure
 
 
 def run(
@@ -33,9 +35,13 @@ def run(
     episodes = series.run(log, options.resume, options.jobs, progress)
     asked = {"episodes": len(episodes), "policy": contender.identity}
     found = asked | Summary.of(episodes).as_dict()
-    write_results(
-        options, progress, found, {"statistics.png": partial(statistics_figure, episodes)}
-    )
+
+    def figure() -> Figure:
+        from icub_jump_env.evaluation.figures.statistics import statistics_figure
+
+        return statistics_figure(episodes)
+
+    write_results(options, progress, found, {"statistics.png": figure})
     title, table, lines = render(episodes, options, contender)
     say(console, title)
     show(console, table)
