@@ -1,6 +1,7 @@
 """The page of ``--report``: complete, self-contained and at home in a real browser."""
 
 import base64
+import contextlib
 import dataclasses
 import io
 import itertools
@@ -18,6 +19,7 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
 from icub_jump_env.evaluation.figures.snapshots import (
     STRIP_WIDTH,
     Shot,
@@ -57,7 +59,12 @@ def page(pictures, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def shots(pictures):
-    return take_snapshots(CONFIG, 0)
+    return take_snapshots(CONFIG, traced_episode(CONFIG))
+
+
+def traced_episode(config):
+    with contextlib.closing(make_env(traced(config))) as env:
+        return run_episode(env, 0, trace=True)
 
 
 class Reader(HTMLParser):
@@ -218,7 +225,8 @@ def test_the_strip_fits_a_readme(shots):
 
 def test_without_take_off_there_are_two_moments(pictures):
     weak = ActuatorConfig(motor=DCMotor(current_limit=0.3))
-    names = [shot.name for shot in take_snapshots(JumpConfig(actuators=weak), 0)]
+    config = JumpConfig(actuators=weak)
+    names = [shot.name for shot in take_snapshots(config, traced_episode(config))]
     assert names == ["Crouch", "End"]
 
 
@@ -232,7 +240,7 @@ def unseen(monkeypatch, pictures):
 
 def test_other_jumps_are_told_from_the_papers(unseen, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "argv", ["eval.py", "--report", "<script>alert(1)</script>"])
-    config = JumpConfig(jump_height=0.05, momentum_control=False)
+    config = JumpConfig(jump_height=0.05, momentum_control=False, stand_time=1.0)
     text = report.write_report(tmp_path, config, 3, QUIET).read_text()
     read = Reader(text)
     assert read.all("script") == []

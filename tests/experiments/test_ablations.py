@@ -38,6 +38,7 @@ def runs(monkeypatch):
     monkeypatch.setattr(shipped, "TASK", CONFIG)
     monkeypatch.setattr(ablations, "TEST", SEEDS)
     monkeypatch.setattr(ablations, "RUNS", Path("kept"))
+    monkeypatch.setattr(ablations, "_RESAMPLES", 200)
     Path("kept").mkdir()
     for number, (name, policy) in enumerate(SHIFTS.items()):
         save_policy(
@@ -104,7 +105,7 @@ class TestRunsInterval:
 
 def test_without_runs_it_says_how_to_make_them(monkeypatch):
     monkeypatch.setattr(ablations, "RUNS", Path("nothing"))
-    with pytest.raises(ConfigError, match=r"agents\.evidence"):
+    with pytest.raises(ConfigError, match=r"experiments\.evidence"):
         compare_trainings(AblationOptions())
 
 

@@ -14,6 +14,7 @@ from experiments.rivals import constant_shift
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.contender import BASELINE
 from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.statistics import intervals
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.policy import save_policy
 
@@ -54,6 +55,7 @@ def small(monkeypatch):
         "TEST": range(3000, 3003), "_GRID_SEEDS": range(2), "PRETRAINED": Path("shipped"),
     }.items():  # fmt: skip
         monkeypatch.setattr(frontier, name, value)
+    monkeypatch.setattr(intervals, "_RESAMPLES", 200)
     Path("shipped").mkdir()
     for name, shift in (("velocity", 0.0), ("velocity-constant", 0.2)):
         save_policy(

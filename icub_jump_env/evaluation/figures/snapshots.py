@@ -47,14 +47,12 @@ class Shot:
         return self.picture[_CROP]
 
 
-def take_snapshots(config: JumpConfig, seed: int) -> list[Shot]:
-    """Picture crouch, take-off, apex, first impact and end of a jump.
-
-    Jumps twice: to know when the moments are, and to picture them.
+def take_snapshots(config: JumpConfig, episode: Episode) -> list[Shot]:
+    """Picture crouch, take-off, apex, first impact and end of a jump, which jumps once more.
 
     Args:
         config: The jump.
-        seed: Seed of the episode.
+        episode: Its traced episode, without a policy.
 
     Returns:
         The moments in order; without a flight only the first and the last.
@@ -62,8 +60,7 @@ def take_snapshots(config: JumpConfig, seed: int) -> list[Shot]:
     Raises:
         MissingDependencyError: If there is no OpenGL.
     """
-    with contextlib.closing(make_env(traced(config))) as env:
-        moments = _moments(run_episode(env, seed, trace=True))
+    moments = _moments(episode)
     pictures: dict[int, Frame] = {}
     steps = itertools.count()
 
@@ -74,28 +71,21 @@ def take_snapshots(config: JumpConfig, seed: int) -> list[Shot]:
 
     visible = dataclasses.replace(traced(config), render_mode="rgb_array")
     with contextlib.closing(make_env(visible)) as env:
-        trace = run_episode(env, seed, trace=True, on_step=look).trace
-    return [Shot(name, trace[step].time, pictures[step]) for name, step in moments.items()]
+        run_episode(env, episode.seed, on_step=look)
+    return [Shot(name, episode.trace[step].time, pictures[step]) for name, step in moments.items()]
 
 
-def snapshot_strip(config: JumpConfig, seed: int) -> Figure:
-    """The moments of one jump side by side, each labelled with its name and time.
-
-    Args:
-        config: The jump.
-        seed: Seed of the episode.
-
-    Returns:
-        A figure ``STRIP_WIDTH`` pixels wide at its own resolution, that of ``savefig``.
-
-    Raises:
-        MissingDependencyError: If there is no OpenGL.
-    """
-    return draw_strip(take_snapshots(config, seed))
+def snapshot_strip(config: JumpConfig, episode: Episode) -> Figure:
+    """The moments of :func:`take_snapshots` side by side; see :func:`draw_strip`."""
+    return draw_strip(take_snapshots(config, episode))
 
 
 def draw_strip(shots: Sequence[Shot]) -> Figure:
-    """Lay out the shots side by side, with their labels below."""
+    """Lay out the shots side by side, each labelled with its name and time.
+
+    Returns:
+        A figure ``STRIP_WIDTH`` pixels wide at its own resolution, that of ``savefig``.
+    """
     gap, label = 10, 58
     side = (STRIP_WIDTH - gap * (len(shots) - 1)) / len(shots)
     height = side + label

@@ -124,7 +124,7 @@ def _figures(arms: Sequence[Arm], options: EvalOptions) -> dict[str, Callable[[]
 
     return {
         **paper_figures(config, {arm.name: arm.episode for arm in arms}, options.seed),
-        "fig5_snapshots.png": partial(snapshot_strip, config, options.seed),
+        "fig5_snapshots.png": partial(snapshot_strip, config, ours),
     }
 
 

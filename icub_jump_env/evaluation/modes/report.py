@@ -118,7 +118,9 @@ def _jump(config: JumpConfig, seed: int, console: Console) -> JumpOnPage:
     ours, switched = run_nominal(config, seed, trace=True, console=console)
     with progress_display(console) as progress:
         progress.add_task("taking pictures", total=None)
-        shots, switched_shots = (take_snapshots(arm.config, seed) for arm in (ours, switched))
+        shots, switched_shots = (
+            take_snapshots(arm.config, arm.episode) for arm in (ours, switched)
+        )
     apex = next((shot for shot in shots if shot.name == "Apex"), shots[0])
     return JumpOnPage(
         controller=config.controller,

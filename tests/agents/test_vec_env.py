@@ -1,5 +1,6 @@
 """Environments in worker processes: the results of Stable-Baselines3, errors, clean ends."""
 
+import contextlib
 import functools
 import os
 import signal
@@ -11,14 +12,19 @@ import numpy as np
 import psutil
 import pytest
 from stable_baselines3.common.vec_env import DummyVecEnv
+from tiny_run import children
 from troubled_env import TroubledEnv
 
-from agents import workers
+from agents.environment import LaunchEnv
 from agents.vec_env import JumpVecEnv
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import InvalidValueError
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.episodes.workers import WorkerError
+from icub_jump_env.policy import BASELINE
 
 ACTION = np.zeros((2, 1), np.float32)
+CONFIG = JumpConfig(stand_time=0.0)
 
 
 def troubled(*troubles):
@@ -39,12 +45,6 @@ def start():
     for env in started:
         env.close()
     assert children() == before
-
-
-def children():
-    """Except Python's resource tracker, which lives as long as this process."""
-    trackers = "multiprocessing.resource_tracker"
-    return [p for p in psutil.Process().children() if trackers not in " ".join(p.cmdline())]
 
 
 def step_until_trouble(env):
@@ -122,19 +122,22 @@ def test_an_unknown_request_is_named(start):
         start("none").has_attr("anything")
 
 
-@pytest.mark.parametrize("trouble", ["sleep", "stop"])
-def test_a_hung_worker_is_named_and_killed(start, monkeypatch, trouble):
-    env = start("none", trouble)
-    if trouble == "stop":
-        os.kill(env.remotes[1].process.pid, signal.SIGSTOP)
-    env.remotes[1]._patience = 0.5  # from now on: they may take longer to start
-    with pytest.raises(WorkerError, match=r"^worker 1 has not answered for 0\.5 s$"):
-        step_until_trouble(env)
-    monkeypatch.setattr(workers, "_GRACE", 0.2)
+def test_an_evaluation_deals_its_episodes_out():
+    env = JumpVecEnv([functools.partial(LaunchEnv, CONFIG, ("time",), ("forward",))] * 2)
+    with contextlib.closing(env):
+        episodes = env.evaluate(BASELINE, range(7, 10))
+    plain = make_env(CONFIG)
+    assert episodes == [run_episode(plain, seed) for seed in (7, 8, 9)]
+
+
+def test_a_busy_worker_is_ended(start):
+    env = start("none", "sleep")
+    env.reset()
+    for _ in range(2):
+        env.step(ACTION)
+    env.step_async(ACTION)
     env.close()
-    assert not any(worker.process.is_alive() for worker in env.remotes)
-    assert env.remotes[1].process.exitcode == -signal.SIGKILL
-    env.close()
+    assert [worker.process.exitcode for worker in env.remotes] == [-signal.SIGKILL] * 2
 
 
 PROGRAM = """
@@ -160,8 +163,8 @@ if __name__ == "__main__":
 """
 
 
-@pytest.fixture
-def program(tmp_path):
+@pytest.fixture(params=["starting", "running"])
+def program(tmp_path, request):
     script = tmp_path / "program.py"
     script.write_text(PROGRAM)
     folders = Path(__file__).parents[2], Path(__file__).parent
@@ -173,27 +176,18 @@ def program(tmp_path):
         text=True,
         start_new_session=True,
     ) as program:
-        assert program.stdout.readline() == "starting\n"
+        for line in program.stdout:
+            if line == f"{request.param}\n":
+                break
         yield program
         program.kill()
 
 
-@pytest.mark.parametrize("moment", ["starting", "running"])
-def test_an_interrupt_leaves_no_process_and_no_noise(program, moment):
-    if moment == "running":
-        assert program.stdout.readline() == "running\n"
+def test_an_interrupt_leaves_no_process_and_no_noise(program):
+    """Also where it comes while workers start."""
     started = psutil.Process(program.pid).children(recursive=True)
     os.killpg(program.pid, signal.SIGINT)
     output, errors = program.communicate(timeout=60)
     assert output.endswith("interrupted\n")
     assert errors == ""
     assert not psutil.wait_procs(started, timeout=60)[1]
-
-
-def test_a_killed_run_leaves_no_process(program):
-    assert program.stdout.readline() == "running\n"
-    started = psutil.Process(program.pid).children(recursive=True)
-    assert len(started) >= 2
-    program.kill()
-    assert not psutil.wait_procs(started, timeout=60)[1]
-    assert program.communicate(timeout=60) == ("", "")
