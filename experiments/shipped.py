@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 from agents.options import TASK
@@ -24,6 +23,4 @@ CURVE_SUFFIX = ".curve.json"
 def judged_config(contender: Contender) -> JumpConfig:
     """The task's commands and worlds, with what a policy depends on as in its training."""
     assert contender.card is not None  # it was read from a file
-    return dataclasses.replace(
-        as_trained(contender.card), jump_height=TASK.jump_height, randomization=TASK.randomization
-    )
+    return as_trained(contender.card, TASK)

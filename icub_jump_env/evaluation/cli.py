@@ -17,6 +17,7 @@ from typing import Any, NoReturn, TypeVar, get_args
 import tyro
 from rich.console import Console
 
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ICubJumpError, PolicyMismatchError
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.opengl import import_mujoco
@@ -165,7 +166,7 @@ def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
     cards = [contender.card for contender in contenders if contender.card is not None]
     if not cards:
         return None
-    config = as_trained(cards[0])
+    config = as_trained(cards[0], JumpConfig())
     if "compare" in found:
         config = dataclasses.replace(config, jump_height=cards[0].config.jump_height)
         # A range of commands is for this mode alone.

@@ -32,7 +32,7 @@ from icub_jump_env.evaluation.statistics.paper import comparison_rows
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 
-CONFIG = JumpConfig(stand_time=0.1, agent_frequency=25.0)  # few pictures in the videos
+CONFIG = JumpConfig(stand_time=0.1, agent_frequency=10.0)  # few pictures in the videos
 QUIET = Console(file=io.StringIO())
 CHROMIUM, CHROMEDRIVER = "/usr/bin/chromium", "/usr/bin/chromedriver"
 MOMENTS = ["Crouch", "Take-off", "Apex", "First impact", "Stands"]

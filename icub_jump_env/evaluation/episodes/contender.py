@@ -75,8 +75,8 @@ def read_contenders(words: Sequence[str]) -> list[Contender]:
     return contenders
 
 
-def as_trained(card: PolicyCard) -> JumpConfig:
-    """The default jump, with what the policy depends on as it was in its training."""
+def as_trained(card: PolicyCard, jump: JumpConfig) -> JumpConfig:
+    """A jump, with what the policy depends on as it was in its training."""
     return dataclasses.replace(
-        JumpConfig(), **{field: getattr(card.config, field) for field in TASK_FIELDS}
+        jump, **{field: getattr(card.config, field) for field in TASK_FIELDS}
     )
