@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs
 
 from agents.environment import Env, EnvServer
 from icub_jump_env.errors import InvalidValueError
@@ -43,7 +45,7 @@ class JumpVecEnv(SubprocVecEnv):
             self.close()
             raise
 
-    def reset_all(self, seeds: Sequence[int]) -> VecEnvObs:
+    def reset_all(self, seeds: Sequence[int]) -> NDArray[Any]:
         """Reset each environment with its own seed.
 
         Args:
@@ -58,8 +60,12 @@ class JumpVecEnv(SubprocVecEnv):
         """
         if len(seeds) != self.num_envs:
             raise InvalidValueError("seeds", list(seeds), f"{self.num_envs}, one each")
-        self._seeds = list(seeds)
-        return self.reset()
+        for worker, seed in zip(self.remotes, seeds, strict=True):
+            worker.send(("reset", (seed, {})))
+        answers = [worker.recv() for worker in self.remotes]
+        observations, infos = zip(*answers, strict=True)
+        self.reset_infos = list(infos)
+        return np.stack(observations)
 
     def evaluate(self, policy: Policy, seeds: Sequence[int]) -> list[Episode]:
         """Episodes of a policy without exploration, dealt out to the environments.

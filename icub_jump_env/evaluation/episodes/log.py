@@ -108,18 +108,7 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 
 def _line(episode: Episode) -> str:
-    return strict_json(
-        {
-            "seed": episode.seed,
-            "jump_height": episode.jump_height,
-            "outcome": episode.outcome,
-            "is_success": episode.is_success,
-            "reward": episode.reward,
-            "failure": episode.failure,
-            "jump": episode.jump,
-            "world": episode.world,
-        }
-    )
+    return strict_json({name: value for name, value in vars(episode).items() if name != "trace"})
 
 
 def _episode(entry: dict[str, Any]) -> Episode:

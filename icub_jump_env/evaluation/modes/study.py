@@ -26,7 +26,7 @@ from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
 from icub_jump_env.evaluation.quantities import CONTROLLERS, commands, number
 from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
 from icub_jump_env.evaluation.statistics.summary import Summary
-from icub_jump_env.simulation.actuators.config import ACTUATORS
+from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig
 from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
 from icub_jump_env.simulation.sensor_models import SensorConfig, SensorError
 
@@ -51,70 +51,68 @@ class Case:
 
 def cases() -> list[Case]:
     """All cases of the study."""
-    feedback = ACTUATORS["torque_feedback"]
-    delays = [
-        Case("computation time", _ticks(ticks), {"command_delay": ticks}) for ticks in range(4)
-    ]
-    loops = [
-        Case("low-level torque control", "ideal", {"actuators": "ideal"}),
-        *(
-            Case(
-                "low-level torque control",
-                f"feedback, {bandwidth:g} Hz",
-                {
-                    "actuators": dataclasses.replace(
-                        feedback, torque_loop=TorqueFeedback(bandwidth=bandwidth)
-                    )
-                },
-            )
-            for bandwidth in (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5)
-        ),
-        Case("low-level torque control", "current control", {"actuators": "current_control"}),
-    ]
-    # Errors of the feet's sensors reach the joints through the torque feedback.
-    worst = _offset(80.0)
-    sensors = [
-        ("no error", SensorConfig()),
-        *((f"offset {force:g} N", _offset(force)) for force in (10.0, 20.0, 40.0)),
-        ("offset 80 N", worst),
-        *(
-            (
-                f"drift {rate:g} N/s",
-                SensorConfig(
-                    force=SensorError(drift=rate), moment=SensorError(drift=_LEVER * rate)
-                ),
-            )
-            for rate in (20.0, 80.0)
-        ),
-        *((f"calibration {gain:.0%}", SensorConfig(force_gain=gain)) for gain in (0.05, 0.1, 0.2)),
-    ]
-    errors = [
-        Case("force/torque sensors", label, {"actuators": "torque_feedback", "sensors": config})
-        for label, config in sensors
-    ]
-    errors.append(
-        Case(
-            "force/torque sensors",
-            "offset 80 N, current c.",
-            {"actuators": "current_control", "sensors": worst},
-        )
-    )
-    motors = [
-        Case("motors", "rated", {"actuators": "ideal"}),
-        Case("motors", "DC, limits raised", {"actuators": "dc_motor"}),
-        Case("motors", "DC, original limits", {"actuators": "original_limits"}),
-    ]
     realistic = ACTUATORS["realistic"]
     current = dataclasses.replace(realistic, torque_loop=ACTUATORS["current_control"].torque_loop)
-    together = [
-        Case("all together", label, {"actuators": actuators, "sensors": "realistic"} | delay)
-        for delay, words in (({}, ""), ({"command_delay": 2}, ", 2 ticks"))
-        for label, actuators in (
-            (f"torque feedback{words}", realistic),
-            (f"current control{words}", current),
-        )
+    groups: dict[str, dict[str, dict[str, Any]]] = {
+        "computation time": {_ticks(ticks): {"command_delay": ticks} for ticks in range(4)},
+        "low-level torque control": {
+            "ideal": {"actuators": "ideal"},
+            **{
+                f"feedback, {bandwidth:g} Hz": {"actuators": _feedback(bandwidth)}
+                for bandwidth in (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5)
+            },
+            "current control": {"actuators": "current_control"},
+        },
+        # Errors of the feet's sensors reach the joints through the torque feedback.
+        "force/torque sensors": {
+            **{
+                label: {"actuators": "torque_feedback", "sensors": sensors}
+                for label, sensors in _sensor_errors().items()
+            },
+            "offset 80 N, current c.": {"actuators": "current_control", "sensors": _offset(80.0)},
+        },
+        "motors": {
+            "rated": {"actuators": "ideal"},
+            "DC, limits raised": {"actuators": "dc_motor"},
+            "DC, original limits": {"actuators": "original_limits"},
+        },
+        "all together": {
+            f"{loop}{words}": {"actuators": actuators, "sensors": "realistic"} | delay
+            for delay, words in (({}, ""), ({"command_delay": 2}, ", 2 ticks"))
+            for loop, actuators in (("torque feedback", realistic), ("current control", current))
+        },
+    }
+    return [
+        Case(group, label, changes)
+        for group, labelled in groups.items()
+        for label, changes in labelled.items()
     ]
-    return [*delays, *loops, *errors, *motors, *together]
+
+
+def _ticks(ticks: int) -> str:
+    return f"delay of {ticks} control tick{'' if ticks == 1 else 's'}"
+
+
+def _feedback(bandwidth: float) -> ActuatorConfig:
+    loop = TorqueFeedback(bandwidth=bandwidth)
+    return dataclasses.replace(ACTUATORS["torque_feedback"], torque_loop=loop)
+
+
+def _sensor_errors() -> dict[str, SensorConfig]:
+    return {
+        "no error": SensorConfig(),
+        **{f"offset {force:g} N": _offset(force) for force in (10.0, 20.0, 40.0, 80.0)},
+        **{f"drift {rate:g} N/s": _drift(rate) for rate in (20.0, 80.0)},
+        **{f"calibration {gain:.0%}": SensorConfig(force_gain=gain) for gain in (0.05, 0.1, 0.2)},
+    }
+
+
+def _offset(force: float) -> SensorConfig:
+    return SensorConfig(force=SensorError(bias=force), moment=SensorError(bias=_LEVER * force))
+
+
+def _drift(rate: float) -> SensorConfig:
+    return SensorConfig(force=SensorError(drift=rate), moment=SensorError(drift=_LEVER * rate))
 
 
 @dataclass(frozen=True)
@@ -193,11 +191,3 @@ def _cells(summary: Summary) -> tuple[str, str, str]:
         number(summary.median("flight_rotation"), "deg"),
         number(summary.landed.share, "%"),
     )
-
-
-def _offset(force: float) -> SensorConfig:
-    return SensorConfig(force=SensorError(bias=force), moment=SensorError(bias=_LEVER * force))
-
-
-def _ticks(ticks: int) -> str:
-    return f"delay of {ticks} control tick{'' if ticks == 1 else 's'}"
