@@ -7,6 +7,7 @@ import shlex
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -27,15 +28,7 @@ from icub_jump_env.evaluation.modes.video import SLOW_MOTION, check_video, recor
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.quantities import CONTROLLERS
 from icub_jump_env.evaluation.report.output import check_writable, progress_display, say
-from icub_jump_env.evaluation.report.page import (
-    JumpOnPage,
-    Moment,
-    Picture,
-    data_uri,
-    drawing,
-    photo,
-    render,
-)
+from icub_jump_env.evaluation.report.page import Picture, data_uri, drawing, photo, render
 from icub_jump_env.evaluation.report.provenance import command, versions
 from icub_jump_env.evaluation.statistics.paper import comparison_rows, verdict
 from icub_jump_env.files import write_file
@@ -114,7 +107,8 @@ def write_report(folder: Path, config: JumpConfig, seed: int, console: Console) 
     return file
 
 
-def _jump(config: JumpConfig, seed: int, console: Console) -> JumpOnPage:
+def _jump(config: JumpConfig, seed: int, console: Console) -> dict[str, Any]:
+    """What the page shows of one controller."""
     ours, switched = run_nominal(config, seed, trace=True, console=console)
     with progress_display(console) as progress:
         progress.add_task("taking pictures", total=None)
@@ -122,23 +116,24 @@ def _jump(config: JumpConfig, seed: int, console: Console) -> JumpOnPage:
             take_snapshots(arm.config, arm.episode) for arm in (ours, switched)
         )
     apex = next((shot for shot in shots if shot.name == "Apex"), shots[0])
-    return JumpOnPage(
-        controller=config.controller,
-        ends=_OUTCOMES[ours.episode.outcome],
-        rows={
+    return {
+        "controller": config.controller,
+        "ends": _OUTCOMES[ours.episode.outcome],
+        "rows": {
             row.quantity: row for row in comparison_rows(config, ours.episode, switched.episode)
         },
-        verdict=verdict(ours.episode, switched.episode, config.momentum_control),
-        video=_video(config, seed, console),
-        poster=photo(apex.picture),
-        moments=_moments(ours, shots),
-        switched_moments=_moments(switched, switched_shots),
-        launch=_launch(ours),
-        base_pitch=_base_pitch(ours, switched),
-    )
+        "verdict": verdict(ours.episode, switched.episode, config.momentum_control),
+        "video": _video(config, seed, console),
+        "poster": photo(apex.picture),
+        "moments": _moments(ours, shots),
+        "switched_moments": _moments(switched, switched_shots),
+        "launch": _launch(ours),
+        "base_pitch": _base_pitch(ours, switched),
+    }
 
 
-def _moments(arm: Arm, shots: Sequence[Shot]) -> list[Moment]:
+def _moments(arm: Arm, shots: Sequence[Shot]) -> list[tuple[Shot, Picture]]:
+    """A strip of pictures, each with the moment that it shows."""
     moments = []
     for shot in shots:
         height, width, _ = shot.close_up.shape
@@ -146,8 +141,7 @@ def _moments(arm: Arm, shots: Sequence[Shot]) -> list[Moment]:
             f"The iCub, {arm.config.controller} controller, {arm.name} the momentum constraint: "
             f"{shot.name.lower()} at {shot.time:.3f} s"
         )
-        picture = Picture(photo(shot.close_up), width, height, alt)
-        moments.append(Moment(shot.name, shot.time, picture))
+        moments.append((shot, Picture(photo(shot.close_up), width, height, alt)))
     return moments
 
 

@@ -9,11 +9,9 @@ from typing import Any
 
 import jinja2
 
-from icub_jump_env.config import ControllerName
 from icub_jump_env.evaluation.episodes.rollout import Frame
 from icub_jump_env.evaluation.figures.style import PAGE, Figure, page_colors, svg
 from icub_jump_env.evaluation.quantities import commands
-from icub_jump_env.evaluation.statistics.paper import Row
 
 
 @dataclass(frozen=True)
@@ -33,44 +31,6 @@ class Picture:
     height: int
     alt: str
     caption: str = ""
-
-
-@dataclass(frozen=True)
-class Moment:
-    """One picture of a strip."""
-
-    name: str
-    time: float
-    picture: Picture
-
-
-@dataclass(frozen=True)
-class JumpOnPage:
-    """What the page shows of one controller.
-
-    Attributes:
-        controller: Its name.
-        ends: How the jump ends.
-        rows: The table against the paper, by quantity.
-        verdict: Which arm of the ablation stands.
-        video: The jump as a data URI.
-        poster: The picture shown before the video runs.
-        moments: The strip of the jump as configured.
-        switched_moments: The same with the momentum constraint switched over.
-        launch: The paper's Fig. 2 or 3.
-        base_pitch: The paper's Fig. 6.
-    """
-
-    controller: ControllerName
-    ends: str
-    rows: dict[str, Row]
-    verdict: str
-    video: str
-    poster: str
-    moments: list[Moment]
-    switched_moments: list[Moment]
-    launch: Picture
-    base_pitch: Picture
 
 
 def data_uri(media_type: str, content: bytes) -> str:

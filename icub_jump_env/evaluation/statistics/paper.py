@@ -8,42 +8,29 @@ from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import Episode, planned
 from icub_jump_env.evaluation.quantities import QUANTITIES, SCALE, shown
 
+_COMMANDED = {"takeoff_velocity": 0.89, "takeoff_time": 0.43}
 
-@dataclass(frozen=True)
-class PaperResult:
-    """Numbers of the nominal jump, 4 cm at a displacement of 11 cm; SI units.
+PAPER: dict[ControllerName, dict[str, float]] = {
+    "velocity": {
+        "flight_height": 0.035, "sole_height": 0.037, "ballistic_height": 0.03, **_COMMANDED,
+    },
+    "torque": {"flight_height": 0.016, "sole_height": 0.023, **_COMMANDED},
+}  # fmt: skip
+"""The paper's numbers of the nominal jump, 4 cm at a displacement of 11 cm, by metric; SI units.
 
-    Attributes:
-        flight_height: CoM rise in flight (simulation, section IV-A).
-        sole_height: Largest height of the soles (simulation, section IV-A).
-        ballistic_height: CoM rise computed from the take-off speed measured on the
-            real robot (section IV-B), which jumped with the velocity controller only.
-        takeoff_velocity: Commanded take-off velocity (section IV).
-        takeoff_time: Take-off time (section IV, Fig. 2).
-    """
-
-    flight_height: float
-    sole_height: float
-    ballistic_height: float | None
-    takeoff_velocity: float = 0.89
-    takeoff_time: float = 0.43
-
-
-PAPER: dict[ControllerName, PaperResult] = {
-    "velocity": PaperResult(0.035, 0.037, ballistic_height=0.03),
-    "torque": PaperResult(0.016, 0.023, ballistic_height=None),
-}
-
-_REAL_ROBOT = "real robot"
+Heights are those of the simulation (section IV-A), take-off velocity and time those commanded
+(section IV, Fig. 2). The ballistic height was computed from the take-off speed measured on the
+real robot (section IV-B), which jumped with the velocity controller only.
+"""
 
 SOURCES = {
     "flight_height": "simulation",
     "sole_height": "simulation",
     "takeoff_velocity": "command",
     "takeoff_time": "command",
-    "ballistic_height": _REAL_ROBOT,
+    "ballistic_height": "real robot",
 }
-"""Where the paper's values come from, by metric."""
+"""Where they come from."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +80,10 @@ def comparison_rows(config: JumpConfig, ours: Episode, other: Episode) -> list[R
     for quantity, metric, unit in QUANTITIES:
         scale, source = SCALE.get(unit, 1.0), SOURCES.get(metric, "")
         value, beside = (scale * float(episode.jump[metric]) for episode in (ours, other))
-        paper = getattr(PAPER[config.controller], metric, None)
+        paper = PAPER[config.controller].get(metric)
         reference = None if paper is None else scale * paper
         difference = None
-        if reference is not None and same_jump and source != _REAL_ROBOT:
+        if reference is not None and same_jump and source != "real robot":
             difference = value - reference
         rows.append(Row(quantity, unit, reference, value, difference, beside, source))
     return rows
