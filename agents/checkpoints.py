@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 
-from agents.workers import JumpVecEnv
+from agents.vec_env import JumpVecEnv
 from icub_jump_env.errors import ICubJumpError, PolicyFileError
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy.files import load_tensors, save_tensors
@@ -167,7 +167,7 @@ def begin_segment(model: PPO, seed: int, number: int) -> list[int]:
     first, *seeds = _words(seed, number, env.num_envs)
     torch.set_num_threads(1)
     model.set_random_seed(first)
-    model._last_obs = env.reset_all(seeds)  # type: ignore[assignment]
+    model._last_obs = env.reset_all(seeds)
     model._last_episode_starts = np.ones(env.num_envs, dtype=bool)
     for buffer in (model.ep_info_buffer, model.ep_success_buffer):
         if buffer is not None:  # else learn() has yet to make it

@@ -12,8 +12,8 @@ from rich.console import Console
 from agents.options import OPTIONS, TrainOptions, read_options
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.cli import guarded, parse, seek
-from icub_jump_env.evaluation.output import say
-from icub_jump_env.evaluation.parallel import WorkerError
+from icub_jump_env.evaluation.episodes.workers import WorkerError
+from icub_jump_env.evaluation.report.output import say
 
 _REMEDY = (
     "training needs the extra 'rl': pip install \"icub-jump[rl]\" "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.jump import RESIDUAL_TIME
 from icub_jump_env.env import ICubJumpEnv
-from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode
+from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
 from icub_jump_env.observation import OBSERVATION_LIMIT, entry_scales
 from icub_jump_env.policy import Policy
 from icub_jump_env.policy.fields import AXES
 from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 
 Array = NDArray[np.float32]
+Env = gymnasium.Env[Any, Any]
 
 
 def acting_steps(config: JumpConfig) -> int:
@@ -48,23 +49,19 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
     are zero.
     """
 
-    def __init__(
-        self, config: JumpConfig, inputs: Sequence[str], axes: Sequence[str], number: int = 0
-    ) -> None:
+    def __init__(self, config: JumpConfig, inputs: Sequence[str], axes: Sequence[str]) -> None:
         """Build the environment.
 
         Args:
             config: The jump.
             inputs: Names of the entries of the observation that the agent sees.
             axes: Axes of the action that it uses.
-            number: Which of several environments side by side it is.
         """
         self.env: ICubJumpEnv = make_env(config)
         entries = list(entry_scales())
         self._columns = [entries.index(name) for name in inputs]
         self._axes = [AXES.index(axis) for axis in axes]
         self._n_steps = acting_steps(config)
-        self._number = number
         self._scale = 1.0
         self._step = 0
         self._over = False
@@ -99,18 +96,53 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
         return observation[self._columns], reward, ends, False, info
 
     def evaluate(self, policy: Policy, seeds: Sequence[int]) -> list[Episode]:
-        """An episode of a policy, without exploration.
-
-        Args:
-            policy: What acts, on the whole observation.
-            seeds: One for each of the environments side by side; the last may get none.
-
-        Returns:
-            The episode of this environment, if any.
-        """
-        mine = seeds[self._number : self._number + 1]
-        return [run_episode(self.env, seed, policy) for seed in mine]
+        """Episodes of a policy that sees the whole observation, without exploration."""
+        return [run_episode(self.env, seed, policy) for seed in seeds]
 
     def close(self) -> None:
         """As :meth:`ICubJumpEnv.close`."""
         self.env.close()
+
+
+class EnvServer:
+    """Answers what Stable-Baselines3's ``SubprocVecEnv`` asks in a training, in a worker.
+
+    It stands here, and not beside :class:`agents.vec_env.JumpVecEnv`, so that a worker imports
+    what its environment needs, and not torch.
+    """
+
+    def __init__(self, make_env: Callable[[], Env]) -> None:
+        self._env = make_env()
+
+    def __call__(self, request: tuple[str, Any]) -> Any:
+        """Answer a request: a command and its arguments."""
+        command, data = request
+        match command:
+            case "step":
+                return self._step(data)
+            case "reset":
+                seed, options = data
+                return self._env.reset(seed=seed, options=options or None)
+            case "get_spaces":
+                return self._env.observation_space, self._env.action_space
+            case "get_attr":
+                return self._env.get_wrapper_attr(data)
+            case "env_method":
+                name, args, kwargs = data
+                return self._env.get_wrapper_attr(name)(*args, **kwargs)
+        raise NotImplementedError(f"a worker does not know {command!r}")
+
+    def close(self) -> None:
+        """Free the environment."""
+        self._env.close()
+
+    def _step(self, action: Array) -> tuple[Any, ...]:
+        """One step, and the next reset if it ends the episode, as Stable-Baselines3 wants them."""
+        observation, reward, terminated, truncated, info = self._env.step(action)
+        done = terminated or truncated
+        info["TimeLimit.truncated"] = truncated and not terminated
+        reset_info: dict[str, Any] = {}
+        if done:
+            info["terminal_observation"] = observation
+            observation, reset_info = self._env.reset()
+        return observation, reward, done, info, reset_info

@@ -9,7 +9,7 @@ from stable_baselines3 import PPO
 
 from agents.environment import acting_steps
 from agents.options import TrainOptions
-from agents.workers import JumpVecEnv
+from agents.vec_env import JumpVecEnv
 from icub_jump_env.policy import NetworkPolicy
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
 import math
 import time
@@ -15,7 +14,14 @@ from typing import Any
 import numpy as np
 import torch
 from rich.console import Console
-from rich.progress import Progress, TaskID
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
@@ -30,17 +36,16 @@ from agents.checkpoints import (
     segment_seeds,
 )
 from agents.environment import LaunchEnv, acting_steps
-from agents.options import COMMAND, OPTIONS, TrainOptions, read_options
+from agents.options import COMMAND, OPTIONS, SELECTION, TrainOptions, read_options
 from agents.ppo import export, freeze_policy, make_model, set_noise
 from agents.run_folder import lock_run
-from agents.seeds import SELECTION
-from agents.workers import JumpVecEnv
+from agents.vec_env import JumpVecEnv
 from icub_jump_env.errors import ConfigError, PolicyFileError
-from icub_jump_env.evaluation.output import progress_display, say, write_json
-from icub_jump_env.evaluation.provenance import SOURCE, command, source, versions
-from icub_jump_env.evaluation.rollout import Episode
-from icub_jump_env.evaluation.summary import Summary, by_command, command_range
-from icub_jump_env.evaluation.table import CM, DEG
+from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.quantities import CM, DEG, PERCENT, commands, number
+from icub_jump_env.evaluation.report.output import progress_display, say, write_json
+from icub_jump_env.evaluation.report.provenance import SOURCE, command, source, versions
+from icub_jump_env.evaluation.statistics.summary import Command, Summary, by_command, command_range
 from icub_jump_env.policy import load_policy, save_policy
 from icub_jump_env.policy.fields import check_command
 
@@ -68,7 +73,7 @@ def train(options: TrainOptions, console: Console) -> None:
         ConfigError: If the folder holds another run, or the run had too many checkpoints.
         RunLockedError: If another process writes to it.
         CheckpointError: If it is to be resumed and all its checkpoints are damaged.
-        WorkerError: If a worker dies, hangs or meets an error.
+        WorkerError: If a worker dies or meets an error.
         OSError: If the file system refuses.
     """
     _check_checkpoints(options)
@@ -82,8 +87,7 @@ def train(options: TrainOptions, console: Console) -> None:
         if checkpoint is None and options.resume is not None:
             say(console, f"no checkpoint in {folder}: starting from step 0")
         make = partial(LaunchEnv, options.env, options.input_names, options.axes)
-        numbers = range(options.jobs)
-        with contextlib.closing(JumpVecEnv([partial(make, number) for number in numbers])) as env:
+        with contextlib.closing(JumpVecEnv([make] * options.jobs)) as env:
             _learn(options, words, env, checkpoint, console)
         say(console, f"wrote {folder / BEST}")
 
@@ -163,7 +167,9 @@ def _learn(
         board.writer.close()
         board.writer = SummaryWriter(folder, purge_step=model.num_timesteps + 1)
     logger = Logger(str(options.folder), [board])
-    with contextlib.closing(logger), progress_display(console) as display:
+    # Without the time left, which would ignore the evaluations to come.
+    columns = TextColumn("learning"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    with contextlib.closing(logger), progress_display(console, *columns) as display:
         model.set_logger(logger)
         task = display.add_task("learning", total=options.timesteps)
         run = _Run(options, words, console, display, task)
@@ -261,11 +267,11 @@ class _Run(BaseCallback):
     def _log_episodes(self) -> None:
         record = self.logger.record
         infos, self._episodes = self._episodes, []
-        success: dict[tuple[int, int], list[bool]] = {}
+        success: dict[Command, list[bool]] = {}
         for info in infos:
             success.setdefault(command_range(info["jump_height"]), []).append(info["is_success"])
-        for (low, high), successes in success.items():
-            record(f"rollout/success_{low}_to_{high}_cm", np.mean(successes))
+        for bounds, successes in success.items():
+            record(f"rollout/success_{commands(*bounds).replace(' ', '_')}", np.mean(successes))
         jumps = [info["jump"] for info in infos]
         record("rollout/success", np.mean([info["is_success"] for info in infos]))
         record("rollout/landed", np.mean([jump["landed"] for jump in jumps]))
@@ -295,11 +301,7 @@ class _Run(BaseCallback):
 
     def _evaluate(self) -> None:
         policy = export(self.model, self._options, self._action_scale)
-        episodes: list[Episode] = []
-        # One episode each at a time: a worker that does not answer for long counts as hung.
-        for start in range(0, len(SELECTION), self._options.jobs):
-            seeds = SELECTION[start : start + self._options.jobs]
-            episodes += itertools.chain(*self._env.env_method("evaluate", policy, seeds))
+        episodes = self._env.evaluate(policy, SELECTION)
         self._curve.append(_point(self.model.num_timesteps, episodes))
         now = time.monotonic()
         self._minutes.append(round((now - self._since) / 60, 3))
@@ -326,8 +328,8 @@ class _Run(BaseCallback):
         )
         say(
             self._console,
-            f"{newest['timesteps']} steps: success {100 * newest['success']:.1f} %, "
-            f"rise {CM * newest['rise']:.2f} cm",
+            f"{newest['timesteps']} steps: success {PERCENT * newest['success']:.1f} %, "
+            f"rise {number(newest['rise'], 'cm')} cm",
         )
 
     def _save_policy(self, name: str) -> None:
@@ -363,7 +365,7 @@ def _point(timesteps: int, episodes: Sequence[Episode]) -> dict[str, Any]:
         "rise": summary.mean_rise,
         "rotation": None if math.isnan(summary.median_rotation) else summary.median_rotation,
         "success_by_command": {
-            f"{low} to {high} cm": Summary.of(group).success.share
-            for (low, high), group in by_command(episodes).items()
+            commands(*bounds): Summary.of(group).success.share
+            for bounds, group in by_command(episodes).items()
         },
     }

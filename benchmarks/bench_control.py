@@ -26,7 +26,7 @@ from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.readings import Readings
-from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
 from icub_jump_env.planning.reference import Reference
 from icub_jump_env.planning.residual import ResidualFilter
 from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory

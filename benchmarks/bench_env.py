@@ -22,7 +22,7 @@ from icub_jump_env.control.solvers import DAQPSolver
 
 from icub_jump_env.config import ControllerName, JumpConfig
 from icub_jump_env.env import ICubJumpEnv
-from icub_jump_env.evaluation.rollout import make_env
+from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.metrics.jump import JumpRecorder
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics

@@ -6,13 +6,20 @@ import os
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
+import io
+import signal
+
 import gymnasium
 import numpy as np
 import pytest
 from hypothesis import settings
+from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.rollout import Episode, make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode, traced
+
+# Where tests run in the background, Ctrl-C is ignored, also by the programs that they start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("ci", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("ci")
@@ -21,6 +28,12 @@ settings.load_profile("ci")
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20190425)
+
+
+@pytest.fixture
+def quiet() -> Console:
+    """A console that nobody reads."""
+    return Console(file=io.StringIO())
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ import pytest
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation.rollout import make_env
+from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 from icub_jump_env.simulation.actuators.torque_loops import CurrentControl

@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.command import JointCommand
-from icub_jump_env.evaluation.rollout import make_env
+from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.robot import facts
 from icub_jump_env.simulation.actuators.config import ACTUATORS, FRICTION, ActuatorConfig
 from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback

@@ -7,7 +7,7 @@ from conftest import ZERO, jump
 from icub_jump_env import JumpConfig
 from icub_jump_env.control.jump import RESIDUAL_TIME
 from icub_jump_env.control.phases import Phase
-from icub_jump_env.evaluation.rollout import make_env
+from icub_jump_env.evaluation.episodes.rollout import make_env
 
 SHIFT = np.array([0.4, 0.2, -0.5], np.float32)
 

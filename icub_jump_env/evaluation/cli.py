@@ -5,23 +5,22 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import importlib
 import io
 import json
 import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args
+from typing import Any, NoReturn, TypeVar, get_args
 
 import tyro
 from rich.console import Console
 
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ICubJumpError, PolicyMismatchError
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.opengl import import_mujoco
-
-if TYPE_CHECKING:
-    from icub_jump_env.evaluation.contender import Contender
 
 T = TypeVar("T")
 
@@ -123,7 +122,7 @@ def _evaluate(arguments: Sequence[str]) -> None:
     options = parse(EvalOptions, arguments, _as_trained(arguments))
     import_mujoco()
     # Imported here, like the modes, so that --help and bad arguments answer at once.
-    from icub_jump_env.evaluation.output import check_writable, say
+    from icub_jump_env.evaluation.report.output import check_writable, say
 
     for name in ("json", "video", "results"):
         path = getattr(options, name)
@@ -132,11 +131,11 @@ def _evaluate(arguments: Sequence[str]) -> None:
     if options.plot is not None:
         check_writable("plot", options.plot, folder=True)
     if options.video is not None:
-        from icub_jump_env.evaluation.video import check_video, record_video
+        from icub_jump_env.evaluation.modes.video import check_video, record_video
 
         check_video(options.video)
 
-    from icub_jump_env.evaluation.contender import read_contenders
+    from icub_jump_env.evaluation.episodes.contender import read_contenders
     from icub_jump_env.policy import check_match
 
     words = options.compare or (options.policy or "baseline",)
@@ -148,11 +147,12 @@ def _evaluate(arguments: Sequence[str]) -> None:
             except PolicyMismatchError as error:
                 raise ICubJumpError(f"{contender.name}: {error}") from error
     console, progress = Console(), Console(stderr=True)
-    _run_mode(options, contenders, console, progress)
+    mode = importlib.import_module(f"icub_jump_env.evaluation.modes.{options.mode}")
+    mode.run(options, contenders, console, progress)
     if options.video is not None:
         policy = contenders[0].policy
         record_video(options.video, options.config, options.seed, progress, policy)
-        say(console, f"wrote {options.video}")
+        say(progress, f"wrote {options.video}")
 
 
 def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
@@ -160,55 +160,18 @@ def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
     found = seek(arguments, "compare", "policy")
     if not found:
         return None
-    from icub_jump_env.evaluation.contender import as_trained, read_contenders
+    from icub_jump_env.evaluation.episodes.contender import as_trained, read_contenders
 
     contenders = read_contenders(found.get("compare") or found["policy"])
     cards = [contender.card for contender in contenders if contender.card is not None]
     if not cards:
         return None
-    config = as_trained(cards[0])
+    config = as_trained(cards[0], JumpConfig())
     if "compare" in found:
         config = dataclasses.replace(config, jump_height=cards[0].config.jump_height)
         # A range of commands is for this mode alone.
         return EvalOptions(config=config, compare=tuple(found["compare"]))
     return EvalOptions(config=config)
-
-
-def _run_mode(
-    options: EvalOptions, contenders: Sequence[Contender], console: Console, progress: Console
-) -> None:
-    match options.mode:
-        case "statistics":
-            from icub_jump_env.evaluation.statistics import run_statistics
-
-            run_statistics(options, contenders[0], console, progress)
-        case "compare":
-            from icub_jump_env.evaluation.compare import run_compare
-
-            run_compare(options, contenders, console, progress)
-        case "study":
-            from icub_jump_env.evaluation.study import run_study
-
-            run_study(options, console, progress)
-        case "sweep":
-            from icub_jump_env.evaluation.sweep import run_sweep
-
-            run_sweep(options, console, progress)
-        case "view":
-            from icub_jump_env.evaluation.view import view
-
-            view(options.config, options.seed, console, policy=contenders[0].policy)
-        case "report":
-            from icub_jump_env.evaluation.output import say
-            from icub_jump_env.evaluation.report import write_report
-
-            assert options.report is not None  # else it were another mode
-            file = write_report(options.report, options.config, options.seed, progress)
-            say(console, f"wrote {file}")
-        case _:
-            from icub_jump_env.evaluation.nominal import print_nominal
-
-            print_nominal(options, contenders[0], console, progress)
 
 
 def _one_line(complaint: str) -> str:

@@ -52,7 +52,7 @@ class EvalOptions:
         seed: Seed of the first episode; the next ones count up.
         policy: Let this policy act; the jump is set up as its card says.
         compare: Compare policies on the same episodes: files, and the word baseline.
-        jobs: Processes that work in parallel (more than 1 needs the extra 'parallel').
+        jobs: Processes that work in parallel.
         study: How the realism of actuators and sensors changes the jump.
         sweep: Desired height against displacement, for both controllers.
         report: Write one self-contained HTML page into this folder (extra 'video').
@@ -117,6 +117,11 @@ class EvalOptions:
             value = getattr(self.config, name)
             if value != getattr(JumpConfig(), name):
                 raise ConfigError(name, value, f"not with --{self.mode}, which varies it itself")
+
+    @property
+    def seeds(self) -> range:
+        """Of the episodes."""
+        return range(self.seed, self.seed + (self.episodes or 1))
 
     @property
     def mode(self) -> str:

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.robot.mujoco_model import CAMERA
-from icub_jump_env.simulation.opengl import has_display, open_context
+from icub_jump_env.simulation.opengl import open_context
 from icub_jump_env.simulation.physics import Physics
+from icub_jump_env.simulation.viewers.window import WindowScreen
 
 MAX_GEOMS = 1000
 
@@ -92,34 +92,27 @@ class PictureRenderer:
 
 
 class WindowRenderer:
-    """Shows the state in MuJoCo's interactive viewer, at most as fast as real time."""
+    """Shows the state in a window, at most as fast as real time."""
 
     def __init__(self, physics: Physics) -> None:
         self._physics = physics
-        self._viewer: Any = None
+        self._screen: WindowScreen | None = None
         self._shown = 0.0, 0.0
 
     def render(self) -> None:
         """Bring the window up to date when it is time."""
-        if self._viewer is None:
-            self._viewer = self._open()
-        simulated, now = self._physics.data.time, time.monotonic()
+        data = self._physics.data
+        if self._screen is None:
+            self._screen = WindowScreen(self._physics.model)
+        now = time.monotonic()
         last_simulated, last_shown = self._shown
-        time.sleep(max(0.0, min(simulated - last_simulated, 1.0) - (now - last_shown)))
-        self._viewer.sync()
-        self._shown = simulated, time.monotonic()
-
-    def _open(self) -> Any:
-        if not has_display():
-            raise MissingDependencyError(
-                "render_mode='human' needs a display; use render_mode='rgb_array' instead"
-            )
-        import mujoco.viewer  # imports GLFW, which complains without a display
-
-        return mujoco.viewer.launch_passive(self._physics.model, self._physics.data)
+        time.sleep(max(0.0, min(data.time - last_simulated, 1.0) - (now - last_shown)))
+        self._screen.show(data)
+        self._screen.refresh({})
+        self._shown = data.time, time.monotonic()
 
     def close(self) -> None:
         """Close the window."""
-        if self._viewer is not None:
-            self._viewer.close()
-            self._viewer = None
+        if self._screen is not None:
+            self._screen.close()
+            self._screen = None

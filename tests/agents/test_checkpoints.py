@@ -23,7 +23,7 @@ from agents.checkpoints import (
     restore,
     save_checkpoint,
 )
-from agents.workers import JumpVecEnv
+from agents.vec_env import JumpVecEnv
 
 SEED = 20190425
 STEPS = 64

@@ -11,7 +11,7 @@ from stable_baselines3.common.env_checker import check_env
 from agents.environment import LaunchEnv, acting_steps
 from agents.options import TASK
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.rollout import make_env, run_episode
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy import NetworkPolicy
 from icub_jump_env.policy.fields import AXES
@@ -115,18 +115,16 @@ def test_no_launch_of_the_range_is_longer(scaling, height):
 def test_an_evaluation_is_of_the_policy_on_the_plain_environment():
     bias = np.array([0.3], np.float32)
     policy = NetworkPolicy((), ((np.zeros((1, 0), np.float32), bias),), ("vertical",))
-    episodes = []
-    for number in range(3):
-        env = LaunchEnv(CONFIG, SOME, ("forward",), number)
-        env.scale_actions(0.1)
-        launch(env, np.ones((STEPS, 1), np.float32))
-        episodes += env.evaluate(policy, range(7, 9))  # the third environment gets none
-    assert episodes == [run_episode(make_env(CONFIG), seed, policy) for seed in (7, 8)]
+    env = LaunchEnv(CONFIG, SOME, ("forward",))
+    env.scale_actions(0.1)
+    launch(env, np.ones((STEPS, 1), np.float32))
+    plain = make_env(CONFIG)
+    assert env.evaluate(policy, (7, 8)) == [run_episode(plain, seed, policy) for seed in (7, 8)]
 
 
 def test_it_is_an_environment_that_workers_can_build():
     make = pickle.loads(pickle.dumps(functools.partial(LaunchEnv, CONFIG, SOME, ("forward",))))
-    env = make(number=1)
+    env = make()
     assert env.observation_space.shape == (3,)
     assert env.action_space.shape == (1,)
     check_env(env)

@@ -9,7 +9,7 @@ from tiny_run import UNUSUAL
 from agents.options import TASK, PPOOptions, TrainOptions, read_options
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation.output import write_json
+from icub_jump_env.evaluation.report.output import write_json
 from icub_jump_env.observation import entry_scales
 
 

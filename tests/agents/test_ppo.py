@@ -12,7 +12,7 @@ from tiny_run import PPO
 from agents.environment import LaunchEnv, acting_steps
 from agents.options import TASK, TrainOptions
 from agents.ppo import export, freeze_policy, make_model, set_noise
-from icub_jump_env.evaluation.rollout import make_env
+from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy.fields import AXES
 

@@ -21,7 +21,7 @@ from tiny_run import UNUSUAL, train, written
 from agents.options import TASK, PPOOptions, TrainOptions
 from agents.run_folder import lock_run
 from icub_jump_env.evaluation.cli import evaluate
-from icub_jump_env.evaluation.output import write_json
+from icub_jump_env.evaluation.report.output import write_json
 
 REPOSITORY = Path(__file__).parents[2]
 

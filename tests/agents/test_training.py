@@ -19,9 +19,9 @@ from agents.checkpoints import load_latest
 from agents.environment import acting_steps
 from agents.options import read_options
 from agents.training import MOST_CHECKPOINTS
-from agents.workers import JumpVecEnv
-from icub_jump_env.evaluation.rollout import make_env, run_episode
-from icub_jump_env.evaluation.summary import Summary
+from agents.vec_env import JumpVecEnv
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.evaluation.statistics.summary import Summary
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import load_policy
 from icub_jump_env.policy.files import MAX_CARD_SIZE

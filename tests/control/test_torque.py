@@ -16,7 +16,7 @@ from icub_jump_env.control.solvers import make_solver
 from icub_jump_env.control.torque import TorqueController, TorqueGains
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
-from icub_jump_env.evaluation.rollout import make_env
+from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.reference.com_reference import ComReference
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 from icub_jump_env.robot import facts

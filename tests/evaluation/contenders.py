@@ -4,8 +4,8 @@ import numpy as np
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation import cli
-from icub_jump_env.evaluation.failures import Failure
-from icub_jump_env.evaluation.rollout import Episode
+from icub_jump_env.evaluation.episodes.failures import Failure
+from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.policy import NetworkPolicy, save_policy
 

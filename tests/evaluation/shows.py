@@ -1,7 +1,7 @@
 """The short jump, the clock and the screen that tests of the live view use."""
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.view import FRAME
+from icub_jump_env.evaluation.modes.view import FRAME
 
 SHORT = JumpConfig(stand_time=0.1)
 

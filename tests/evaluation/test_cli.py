@@ -9,26 +9,16 @@ import sys
 from pathlib import Path
 
 import pytest
-from contenders import save_constant
+from contenders import evaluate, save_constant
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
-from icub_jump_env.evaluation import cli, video
+from icub_jump_env.evaluation import cli
+from icub_jump_env.evaluation.modes import video
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import write_json
+from icub_jump_env.evaluation.report.output import write_json
 
 REPOSITORY = Path(__file__).parents[2]
-
-
-def evaluate(capsys, *arguments):
-    """Exit code, stdout and stderr of eval.py with these arguments."""
-    code = 0
-    try:
-        cli.evaluate([*arguments])
-    except SystemExit as end:
-        code = end.code
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def test_prints_the_table_and_writes_json_and_figures(capsys, tmp_path):
@@ -61,9 +51,9 @@ def test_prints_the_table_and_writes_json_and_figures(capsys, tmp_path):
 
 def test_figures_are_drawn_of_a_jump_that_does_not_take_off(capsys, tmp_path):
     weak = '{"motor": {"kind": "dc", "current_limit": 0.3}}'
-    code, out, _ = evaluate(capsys, "--actuators", weak, "--plot", str(tmp_path / "figures"))
+    code, _, err = evaluate(capsys, "--actuators", weak, "--plot", str(tmp_path / "figures"))
     assert code == 0
-    assert "fig6_base_pitch.png" in out
+    assert "fig6_base_pitch.png" in err
 
 
 def test_without_the_constraint_ours_is_the_ablated_jump(capsys):
@@ -219,7 +209,7 @@ def test_interrupt_ends_with_one_line(capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("icub_jump_env.evaluation.nominal.run_episode", interrupted)
+    monkeypatch.setattr("icub_jump_env.evaluation.modes.nominal.run_episode", interrupted)
     code, _, err = evaluate(capsys)
     assert code == 130
     assert err.strip().splitlines()[-1] == "interrupted"
@@ -269,9 +259,9 @@ def test_refusals_are_one_plain_line_in_a_terminal():
 def test_paths_are_not_taken_for_markup(capsys, tmp_path):
     report = tmp_path / "[red]r[" / "q[b].json"
     report.parent.mkdir()
-    code, out, _ = evaluate(capsys, "--stand-time", "0.1", "--json", str(report))
+    code, _, err = evaluate(capsys, "--stand-time", "0.1", "--json", str(report))
     assert code == 0
-    assert f"wrote {report}\n" in out
+    assert f"wrote {report}\n" in err
 
 
 def test_json_is_written_though_nobody_reads_the_table(tmp_path):

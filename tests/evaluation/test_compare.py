@@ -2,7 +2,6 @@
 
 import io
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +11,14 @@ from matplotlib.colors import to_rgba
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation import compare, series
-from icub_jump_env.evaluation.compare import (
+from icub_jump_env.evaluation.episodes import series
+from icub_jump_env.evaluation.episodes.failures import Failure
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.evaluation.figures.compare import compare_figure
+from icub_jump_env.evaluation.modes.compare import (
     render,
 )
-from icub_jump_env.evaluation.compare_figure import compare_figure
-from icub_jump_env.evaluation.failures import Failure
-from icub_jump_env.evaluation.rollout import make_env, run_episode
-from icub_jump_env.evaluation.summary import Rate
+from icub_jump_env.evaluation.statistics.summary import Rate
 
 
 def two_ranges(pattern, rise):
@@ -276,9 +275,23 @@ class TestCommand:
         assert err.count("\n") == 1
         assert "com_displacement=None instead of 0.1" in err
 
-    def test_no_episode_is_run_if_there_can_be_no_workers(self, capsys, asked, monkeypatch):
-        monkeypatch.setitem(sys.modules, "ray", None)
-        monkeypatch.setattr(compare, "run_contenders", lambda *_: pytest.fail("should not jump"))
-        code, _, err = evaluate(capsys, *asked, "--jobs", "2")
+    @pytest.mark.parametrize("drawn", [True, False])
+    def test_a_range_of_commands_needs_a_number_of_episodes(
+        self, capsys, monkeypatch, tmp_path, drawn
+    ):
+        """Also where the card of a policy brings it."""
+        monkeypatch.setattr(series.Series, "run", lambda *_: pytest.fail("should not jump"))
+        card = {} if drawn else {"jump_height": (0.03, 0.04)}
+        flags = ["--jump-height", "0.03", "0.04"] if drawn else []
+        file = save(tmp_path / "p.safetensors", FEEDBACK, **card)
+        code, _, err = evaluate(capsys, "--compare", "baseline", file, *flags)
         assert code == 2
-        assert "icub-jump[parallel]" in err
+        assert "episodes=None is not allowed: " in err
+        assert "3 to 4 cm" in err
+
+    def test_a_single_episode_is_compared_without_intervals(self, capsys, files):
+        flags = ("--randomization", "full", "--jump-height", "0.04", "--stand-time", "0")
+        code, out, _ = evaluate(capsys, "--compare", "baseline", files[1], *flags)
+        assert code == 0
+        assert "seed 0 for each" in out
+        assert "interval " not in out.partition("busy against baseline")[2]

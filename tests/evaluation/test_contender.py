@@ -13,11 +13,13 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation import policy_figure, video, view
-from icub_jump_env.evaluation.contender import read_contenders
-from icub_jump_env.evaluation.log import EpisodeLog
-from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
-from icub_jump_env.evaluation.series import Series
+from icub_jump_env.evaluation.episodes.contender import read_contenders
+from icub_jump_env.evaluation.episodes.log import EpisodeLog
+from icub_jump_env.evaluation.episodes.parallel import run_jobs
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.series import Series
+from icub_jump_env.evaluation.figures import policy as policy_figures
+from icub_jump_env.evaluation.modes import video, view
 from icub_jump_env.policy import load_policy
 
 QUIET = Console(file=io.StringIO())
@@ -71,14 +73,13 @@ class TestSingleJump:
         assert row[-3] != row[-1]
 
     def test_the_picture_shows_where_the_reference_was_moved(self, capsys, tmp_path, monkeypatch):
-        drawn, figure = [], policy_figure.policy_figure
+        drawn, figure = [], policy_figures.policy_figure
         monkeypatch.setattr(
-            policy_figure, "policy_figure", lambda *arms: drawn.append(arms) or figure(*arms)
+            policy_figures, "policy_figure", lambda *arms: drawn.append(arms) or figure(*arms)
         )
         file = save_constant(tmp_path / "mine.safetensors", 0.5, -0.5, 0.2)
-        code, out, _ = evaluate(capsys, "--policy", file, *SHORT, "--plot", "figures")
-        assert code == 0
-        assert out.endswith("wrote figures/policy.png\n")
+        code, _, err = evaluate(capsys, "--policy", file, *SHORT, "--plot", "figures")
+        assert (code, err) == (0, "wrote figures/policy.png\n")
         offset, height, pitch = figure(*drawn[0]).axes
         # Nearly all of the residual scale (0.06, 0.02, 0.02 m) times the action, in cm.
         asked = {"forward": 3.0, "left": -1.0, "up": 0.4}
@@ -254,8 +255,8 @@ class TestOtherModes:
                 self.run = lambda: shown.append(run_episode(env, seed, policy, hold=hold))
 
         monkeypatch.setattr(view, "Show", Show)
-        monkeypatch.setattr(view, "in_browser", lambda _: False)
-        monkeypatch.setattr(view, "open_window_screen", lambda *_: contextlib.ExitStack())
+        monkeypatch.setattr(view, "in_browser", lambda: False)
+        monkeypatch.setattr(view, "open_screen", lambda *_: contextlib.ExitStack())
         view.view(config, 0, QUIET, policy=FEEDBACK)
         assert shown[0].jump == run_episode(make_env(config), 0, FEEDBACK).jump
         assert shown[0].jump != run_episode(make_env(traced(config)), 0, FEEDBACK).jump
@@ -351,7 +352,7 @@ def test_the_default_log_is_another_one_after_the_code_has_changed(monkeypatch):
     series = Series(JumpConfig(), range(3))
     before = series.default_log()
     assert before == series.default_log()
-    monkeypatch.setattr("icub_jump_env.evaluation.series.source", lambda: "of tomorrow")
+    monkeypatch.setattr("icub_jump_env.evaluation.episodes.series.source", lambda: "of tomorrow")
     assert series.default_log() != before
 
 
@@ -360,5 +361,7 @@ def test_a_series_is_completed_from_its_log(monkeypatch, tmp_path):
     series = Series(JumpConfig(stand_time=0.0), range(2))
     episodes = series.complete(1, QUIET)
     assert [episode.seed for episode in episodes] == [0, 1]
-    monkeypatch.setattr("icub_jump_env.evaluation.series.run_jobs", lambda work, jobs: iter(work))
+    monkeypatch.setattr(
+        "icub_jump_env.evaluation.episodes.series.run_jobs", lambda work, jobs: run_jobs((), jobs)
+    )
     assert series.complete(1, QUIET) == episodes

@@ -8,7 +8,11 @@ import pytest
 from contenders import episode, outcomes
 from scipy.stats import binom, multinomial
 
-from icub_jump_env.evaluation.difference import Difference, bootstrap_interval, paired_interval
+from icub_jump_env.evaluation.statistics.difference import (
+    Difference,
+    bootstrap_interval,
+    paired_interval,
+)
 
 
 class TestDifference:
@@ -80,6 +84,10 @@ class TestDifference:
         assert "success -100.0 points (95 % interval -100.0 to -76.0;" in worse
         assert "McNemar p < 0.001" in worse
         assert "rise -0.12 cm" in worse
+
+    def test_of_a_single_pair_there_is_nothing_but_its_values(self):
+        line = str(Difference.of(self.ours[:1], self.theirs[:1]))
+        assert line == ("success +100.0 points, rise +0.30 cm, soles +0.00 cm (a single episode)")
 
 
 class TestPairedInterval:

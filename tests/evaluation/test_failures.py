@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from icub_jump_env.evaluation.failures import Failure, failure_of
+from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
 
 GOOD = {
     "flight_time": 0.18, "landed": True, "flight_height": 0.04, "flight_rotation": 0.01,

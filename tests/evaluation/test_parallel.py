@@ -1,8 +1,6 @@
 """Episodes in worker processes: the same results, clean ends."""
 
 import contextlib
-import importlib.util
-import ipaddress
 import itertools
 import math
 import os
@@ -15,9 +13,9 @@ import psutil
 import pytest
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import MissingDependencyError
-from icub_jump_env.evaluation import parallel
-from icub_jump_env.evaluation.parallel import Job, WorkerError, run_jobs
+from icub_jump_env.evaluation.episodes import parallel
+from icub_jump_env.evaluation.episodes.parallel import Job, run_all, run_jobs
+from icub_jump_env.evaluation.episodes.workers import WorkerError
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -26,28 +24,26 @@ GROUNDED = JumpConfig(control_frequency=1.0, agent_frequency=1.0)
 """Too slow a controller to take off: most metrics are undefined."""
 VARIED = JumpConfig(stand_time=0.0, randomization="full", sensors="realistic")
 
-# Asked, not imported: run_jobs is to import it, with its settings.
-needs_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="needs ray")
-
 
 def episodes(config, count):
     return [Job(config, seed) for seed in range(count)]
 
 
-def descendants(pid=None):
-    return psutil.Process(pid).children(recursive=True)
+def workers(pid=None):
+    """Processes of workers, without Python's resource tracker."""
+    children = psutil.Process(pid).children(recursive=True)
+    return {child for child in children if "spawn_main" in " ".join(child.cmdline())}
 
 
 def all_end(processes):
     return not psutil.wait_procs(processes, timeout=60)[1]
 
 
-def test_one_job_runs_here_without_ray(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    before = descendants()
-    results = dict(run_jobs(episodes(JUMP, 2), jobs=1))
-    assert [results[index].seed for index in range(2)] == [0, 1]
-    assert descendants() == before
+@pytest.mark.parametrize("work", [episodes(JUMP, 2), []])
+def test_one_job_or_none_starts_no_process(monkeypatch, work):
+    monkeypatch.setattr(parallel, "start_workers", lambda _: pytest.fail("no workers"))
+    results = dict(run_jobs(work, jobs=1 if work else 4))
+    assert [results[index].seed for index in range(len(work))] == [job.seed for job in work]
 
 
 def test_one_job_builds_an_environment_per_configuration(monkeypatch):
@@ -58,26 +54,13 @@ def test_one_job_builds_an_environment_per_configuration(monkeypatch):
     assert built == [JUMP, GROUNDED]
 
 
-def test_no_work_starts_nothing(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    assert list(run_jobs([], jobs=4)) == []
-
-
-def test_missing_ray_is_named_at_once(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(MissingDependencyError, match=r"icub-jump\[parallel\]"):
-        run_jobs(episodes(JUMP, 2), jobs=2)
-
-
-@needs_ray
 def test_results_do_not_depend_on_the_jobs(capfd):
     """Nor on the order and on the episodes that ran before, in a world that varies."""
     triples = zip(*(episodes(config, 3) for config in (JUMP, GROUNDED, VARIED)), strict=True)
     work = list(itertools.chain(*triples))
     alone = dict(run_jobs(work, jobs=1))
-    before = set(descendants())
     together = dict(run_jobs(work[::-1], jobs=3))
-    assert all_end(set(descendants()) - before)
+    assert not workers()
     assert capfd.readouterr() == ("", "")
 
     assert sorted(alone) == list(range(len(work)))
@@ -86,74 +69,57 @@ def test_results_do_not_depend_on_the_jobs(capfd):
     assert len({alone[index].jump["flight_height"] for index in (2, 5, 8)}) == 3
 
 
-@needs_ray
+def test_results_come_in_the_order_of_the_work(quiet):
+    """The first one takes longest."""
+    work = [Job(JumpConfig(stand_time=3.0), 7), *episodes(JUMP, 3)]
+    assert [episode.seed for episode in run_all(work, 2, quiet)] == [7, 0, 1, 2]
+
+
 def test_a_killed_worker_ends_the_run_with_one_error(capfd):
-    before = set(descendants())
     results = run_jobs(episodes(JUMP, 1000), jobs=2)
     finished = [next(results) for _ in range(3)]
-    started = set(descendants()) - before
-    busy = []
-    while not busy:
-        busy = [process for process in started if process.name().startswith("ray::_run")]
-    for process in busy:
+    for process in workers():
         process.kill()
-    with pytest.raises(WorkerError, match=r"^seed \d+ failed .*died.*$"):
+    with pytest.raises(WorkerError, match=r"^seed \d+: worker [01] died \(exit code -9\)$"):
         finished.extend(results)
     assert 3 <= len(finished) < 1000
-    assert all_end(started)
+    assert not workers()
     assert capfd.readouterr() == ("", "")
 
 
-@needs_ray
-def test_a_cluster_in_use_is_used_and_left_running():
-    """Even one with fewer processors than jobs; and an error in a worker is named."""
-    ray = parallel._import_ray()
-    ray.init(
-        "local",
-        num_cpus=1,
-        include_dashboard=False,
-        log_to_driver=False,
-        runtime_env={"env_vars": {"PYTHONPATH": str(REPOSITORY)}},
-    )
-    try:
-        results = run_jobs([Job(JUMP, seed) for seed in (0, -1, 1)], jobs=2)
-        with pytest.raises(WorkerError, match=r"seed -1 failed in its worker: ConfigError: seed"):
-            list(results)
-        with contextlib.closing(run_jobs(episodes(JUMP, 1000), jobs=2)) as results:
-            assert next(results)[1].outcome == "stood"
-        assert ray.is_initialized()
-        assert len(dict(run_jobs(episodes(JUMP, 2), jobs=2))) == 2
-    finally:
-        ray.shutdown(wait_for_processes=True)
+def test_an_error_in_a_worker_is_named_with_its_seed(capfd):
+    """Jobs left over are not run, and those that were are kept."""
+    results = run_jobs([Job(JUMP, seed) for seed in (0, -1, 1)], jobs=2)
+    with pytest.raises(WorkerError, match=r"^seed -1: worker 1 failed: ConfigError: seed=-1 "):
+        list(results)
+    assert not workers()
+    assert capfd.readouterr() == ("", "")
 
 
-@needs_ray
-def test_ray_that_does_not_start_is_named(monkeypatch):
-    def refuse(*_, **__):
-        raise ValueError("no\nroom")
-
-    monkeypatch.setattr(parallel._import_ray(), "init", refuse)
-    with pytest.raises(WorkerError, match=r"^Ray did not start: no room$"):
-        next(run_jobs(episodes(JUMP, 2), jobs=2))
+def test_a_run_given_up_leaves_no_process():
+    with contextlib.closing(run_jobs(episodes(JUMP, 1000), jobs=2)) as results:
+        assert next(results)[1].outcome == "stood"
+        assert len(workers()) == 2
+    assert not workers()
 
 
 PROGRAM = """
-import sys
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.parallel import Job, run_jobs
+from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
 
-try:
-    work = [Job(JumpConfig(stand_time=0.0), seed) for seed in range(10_000)]
-    for number, _ in enumerate(run_jobs(work, jobs=2)):
-        if number == 2:
-            print("running", flush=True)
-except KeyboardInterrupt:
-    print("interrupted")
+if __name__ == "__main__":
+    try:
+        work = [Job(JumpConfig(stand_time=0.0), seed) for seed in range(10_000)]
+        for number, _ in enumerate(run_jobs(work, jobs=2)):
+            if number == 2:
+                print("running", flush=True)
+    except KeyboardInterrupt:
+        print("interrupted")
 """
 
 
-@needs_ray
-def test_an_interrupt_leaves_no_process_and_no_noise(tmp_path):
+@pytest.fixture
+def program(tmp_path):
     """From a folder with another package of our name, which workers must not import."""
     script = tmp_path / "scripts" / "program.py"
     folder = tmp_path / "elsewhere"
@@ -163,24 +129,29 @@ def test_an_interrupt_leaves_no_process_and_no_noise(tmp_path):
     with subprocess.Popen(
         [sys.executable, str(script)],
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY), "HOME": str(tmp_path)},
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     ) as program:
         assert program.stdout.readline() == "running\n"
-        started = descendants(program.pid)
-        sockets = [
-            connection.laddr.ip
-            for process in (psutil.Process(program.pid), *started)
-            for connection in process.net_connections("inet")
-            if connection.status == psutil.CONN_LISTEN
-        ]
-        os.killpg(program.pid, signal.SIGINT)
-        assert program.communicate(timeout=120) == ("interrupted\n", "")
+        yield program
+        program.kill()
+
+
+def test_ctrl_c_leaves_no_process_and_no_noise(program):
+    """A terminal sends it to all of them."""
+    started = workers(program.pid)
+    assert len(started) == 2
+    os.killpg(program.pid, signal.SIGINT)
+    assert program.communicate(timeout=60) == ("interrupted\n", "")
     assert all_end(started)
-    assert sockets
-    for address in map(ipaddress.ip_address, sockets):
-        assert (getattr(address, "ipv4_mapped", None) or address).is_loopback
-    assert not (tmp_path / ".ray").exists()
+
+
+def test_a_killed_run_leaves_no_process(program):
+    started = workers(program.pid)
+    assert len(started) == 2
+    program.kill()
+    assert all_end(started)
+    assert program.communicate(timeout=60) == ("", "")

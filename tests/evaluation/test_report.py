@@ -1,6 +1,7 @@
 """The page of ``--report``: complete, self-contained and at home in a real browser."""
 
 import base64
+import contextlib
 import dataclasses
 import io
 import itertools
@@ -18,14 +19,20 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
-from icub_jump_env.evaluation import report
-from icub_jump_env.evaluation.snapshots import STRIP_WIDTH, Shot, draw_strip, take_snapshots
-from icub_jump_env.evaluation.table import comparison_rows
-from icub_jump_env.evaluation.video import check_video
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.figures.snapshots import (
+    STRIP_WIDTH,
+    Shot,
+    draw_strip,
+    take_snapshots,
+)
+from icub_jump_env.evaluation.modes import report
+from icub_jump_env.evaluation.modes.video import check_video
+from icub_jump_env.evaluation.statistics.paper import comparison_rows
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 
-CONFIG = JumpConfig(stand_time=0.1, agent_frequency=25.0)  # few pictures in the videos
+CONFIG = JumpConfig(stand_time=0.1, agent_frequency=10.0)  # few pictures in the videos
 QUIET = Console(file=io.StringIO())
 CHROMIUM, CHROMEDRIVER = "/usr/bin/chromium", "/usr/bin/chromedriver"
 MOMENTS = ["Crouch", "Take-off", "Apex", "First impact", "Stands"]
@@ -52,7 +59,12 @@ def page(pictures, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def shots(pictures):
-    return take_snapshots(CONFIG, 0)
+    return take_snapshots(CONFIG, traced_episode(CONFIG))
+
+
+def traced_episode(config):
+    with contextlib.closing(make_env(traced(config))) as env:
+        return run_episode(env, 0, trace=True)
 
 
 class Reader(HTMLParser):
@@ -213,7 +225,8 @@ def test_the_strip_fits_a_readme(shots):
 
 def test_without_take_off_there_are_two_moments(pictures):
     weak = ActuatorConfig(motor=DCMotor(current_limit=0.3))
-    names = [shot.name for shot in take_snapshots(JumpConfig(actuators=weak), 0)]
+    config = JumpConfig(actuators=weak)
+    names = [shot.name for shot in take_snapshots(config, traced_episode(config))]
     assert names == ["Crouch", "End"]
 
 
@@ -227,7 +240,7 @@ def unseen(monkeypatch, pictures):
 
 def test_other_jumps_are_told_from_the_papers(unseen, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "argv", ["eval.py", "--report", "<script>alert(1)</script>"])
-    config = JumpConfig(jump_height=0.05, momentum_control=False)
+    config = JumpConfig(jump_height=0.05, momentum_control=False, stand_time=1.0)
     text = report.write_report(tmp_path, config, 3, QUIET).read_text()
     read = Reader(text)
     assert read.all("script") == []

@@ -9,9 +9,9 @@ from contenders import FEEDBACK, constant
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.contender import Contender
-from icub_jump_env.evaluation.nominal import run_nominal
-from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.contender import Contender
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.modes.nominal import run_nominal
 
 RANDOM = {"randomization": "full", "sensors": "realistic", "stand_time": 0.1}
 

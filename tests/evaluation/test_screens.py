@@ -1,12 +1,12 @@
 """The screens: a stage of their own, a page for this machine alone, a window on a display."""
 
 import contextlib
+import dataclasses
 import gc
 import io
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -22,10 +22,10 @@ from conftest import jump
 from rich.console import Console
 from shows import SHORT, Clock, ScriptedScreen
 
-from icub_jump_env.errors import ConfigError, MissingDependencyError
-from icub_jump_env.evaluation import view
-from icub_jump_env.evaluation.rollout import make_env, traced
-from icub_jump_env.evaluation.view import Playback, Show
+from icub_jump_env.errors import MissingDependencyError
+from icub_jump_env.evaluation.episodes.rollout import make_env, traced
+from icub_jump_env.evaluation.modes import view
+from icub_jump_env.evaluation.modes.view import Playback, Show
 from icub_jump_env.simulation.opengl import has_display
 from icub_jump_env.simulation.viewers import window
 from icub_jump_env.simulation.viewers.screen import Command, CommandQueue, Stage
@@ -159,17 +159,6 @@ def test_the_episode_in_the_browser_is_that_of_run_episode(browser_screen):
     assert episode == jump(stand_time=SHORT.stand_time)
 
 
-@serves
-def test_a_taken_port_is_refused(model, browser_screen):
-    with socket.create_server(("127.0.0.1", 0)) as other:
-        port = other.getsockname()[1]
-        with pytest.raises(ConfigError, match=f"port={port} is not allowed: a port that nobody"):
-            browser_screen(model, port)
-    for nonsense in (-1, 65536):
-        with pytest.raises(ConfigError, match=f"port={nonsense} .* from 0 to 65535"):
-            browser_screen(model, nonsense)
-
-
 def test_every_button_and_key_of_the_page_has_its_command(monkeypatch):
     view_browser = pytest.importorskip("icub_jump_env.simulation.viewers.browser")
     real, pressed, written = view_browser.imgui, set(), []
@@ -207,7 +196,7 @@ def test_a_missing_studio_names_the_remedy(model, monkeypatch):
     monkeypatch.delitem(sys.modules, "icub_jump_env.simulation.viewers.browser", raising=False)
     monkeypatch.setitem(sys.modules, "mujoco.studio", None)
     with pytest.raises(MissingDependencyError, match=r"MuJoCo Studio .* pip install mujoco"):
-        view.open_browser_screen(model, 0, Console(file=io.StringIO()))
+        view.open_screen(model, True, Console(file=io.StringIO()))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a child alone")
@@ -216,8 +205,9 @@ def test_ctrl_c_ends_the_show_without_a_complaint():
     program = (
         "from rich.console import Console\n"
         "from icub_jump_env.config import JumpConfig\n"
-        "from icub_jump_env.evaluation.view import view\n"
-        "view(JumpConfig(), 0, Console(), 'browser')\n"
+        "from icub_jump_env.evaluation.modes import view\n"
+        "view.in_browser = lambda: True\n"
+        "view.view(JumpConfig(), 0, Console())\n"
         "print('ended')\n"
     )
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
@@ -298,9 +288,25 @@ def test_the_window_shows_the_state_and_takes_keys(model, viewer):
     assert not viewer.running
 
 
+def test_the_environment_shows_itself_in_such_a_window(viewer, monkeypatch):
+    """In real time, and out of reach of what its user does there."""
+    slept = []
+    monkeypatch.setattr("time.sleep", slept.append)
+    env = make_env(dataclasses.replace(SHORT, render_mode="human"))
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(np.zeros(3, np.float32))
+    assert viewer.synced == 4
+    assert viewer.data.time == env.data.time == pytest.approx(0.03)
+    assert viewer.data is not env.data
+    assert 0.0 < slept[-1] <= 0.01
+    env.close()
+    assert not viewer.running
+
+
 def test_ctrl_c_closes_the_window_and_is_no_interrupt(viewer, monkeypatch):
     monkeypatch.setattr(FakeViewer, "sync", lambda _: signal.raise_signal(signal.SIGINT))
-    monkeypatch.setattr(view, "in_browser", lambda _: False)
+    monkeypatch.setattr(view, "in_browser", lambda: False)
     previous = signal.getsignal(signal.SIGINT)
     out = io.StringIO()
     view.view(SHORT, 0, Console(file=out))
@@ -320,16 +326,15 @@ def test_the_meshes_are_shown_and_no_picture_is_rendered(viewer, monkeypatch):
         return ScriptedScreen(lambda _: [Command.QUIT])
 
     monkeypatch.setattr("icub_jump_env.simulation.rendering.open_context", refuse)
-    monkeypatch.setattr(view, "open_window_screen", remember)
-    view.view(SHORT, 0, Console(file=io.StringIO()), "window")
+    monkeypatch.setattr(view, "open_screen", remember)
+    view.view(SHORT, 0, Console(file=io.StringIO()))
     assert models[0].nmesh > 0
 
 
 def test_without_a_display_it_is_the_browser(monkeypatch):
     monkeypatch.setattr(window, "has_display", lambda: False)
-    assert view.in_browser("auto")
-    assert not view.in_browser("window")
-    with pytest.raises(MissingDependencyError, match=r"no window .* in the browser instead"):
+    assert view.in_browser()
+    with pytest.raises(MissingDependencyError, match=r"no window .* in the browser"):
         WindowScreen(None)
 
 
@@ -339,7 +344,7 @@ def test_without_a_reachable_display_it_is_the_browser(monkeypatch):
     monkeypatch.setattr(window, "has_display", lambda: True)
     failing = types.SimpleNamespace(init=lambda: warnings.warn("no display", stacklevel=1))
     monkeypatch.setitem(sys.modules, "glfw", failing)
-    assert view.in_browser("auto")
+    assert view.in_browser()
     with pytest.raises(MissingDependencyError, match="no window"):
         check_window()
 

@@ -1,6 +1,7 @@
 """Rates, percentiles, the log on disk, resuming, replaying."""
 
 import json
+import os
 import shlex
 import signal
 import subprocess
@@ -8,20 +9,23 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 from contenders import episode
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.evaluation import cli, series, statistics
-from icub_jump_env.evaluation.contender import BASELINE
-from icub_jump_env.evaluation.failures import Failure
-from icub_jump_env.evaluation.log import EpisodeLog
+from icub_jump_env.evaluation import cli
+from icub_jump_env.evaluation.episodes import series
+from icub_jump_env.evaluation.episodes.contender import BASELINE
+from icub_jump_env.evaluation.episodes.failures import Failure
+from icub_jump_env.evaluation.episodes.log import EpisodeLog
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.evaluation.figures.statistics import statistics_figure
+from icub_jump_env.evaluation.modes import statistics
+from icub_jump_env.evaluation.modes.statistics import replay_arguments
 from icub_jump_env.evaluation.options import EvalOptions
-from icub_jump_env.evaluation.output import strict_json
-from icub_jump_env.evaluation.rollout import make_env, run_episode
-from icub_jump_env.evaluation.statistics import replay_arguments
-from icub_jump_env.evaluation.statistics_figure import statistics_figure
+from icub_jump_env.files import strict_json
 from icub_jump_env.metrics.jump import JumpMetrics
 from icub_jump_env.simulation.randomization import Randomization
 
@@ -191,10 +195,11 @@ class TestCommand:
 
     def test_a_finished_evaluation_resumes_to_the_same_table_at_once(self, capsys, monkeypatch):
         _, expected, _ = evaluate(capsys, "--episodes", "2")
+        run_jobs = series.run_jobs
 
         def nothing_to_do(work, jobs):
             assert not work
-            return iter(())
+            return run_jobs(work, jobs)
 
         monkeypatch.setattr(series, "run_jobs", nothing_to_do)
         _, out, _ = evaluate(capsys, "--episodes", "2", "--resume")
@@ -215,6 +220,20 @@ class TestCommand:
         header = json.loads(log.read_text().splitlines()[0])
         recorded = EpisodeLog(log, header, resume=True).episodes[options.seed]
         assert replayed == recorded
+
+    @pytest.mark.parametrize("landed", [True, False])
+    def test_of_a_single_episode_its_values_are_shown(self, landed):
+        done = [episode(7, None if landed else Failure.SLIPPED, flight_height=0.0412)]
+        options = EvalOptions(JumpConfig(randomization="full"), seed=7)
+        title, table, lines = statistics.render(done, options, BASELINE)
+        assert title.endswith("randomization full, seed 7")
+        assert [column.header for column in table.columns] == ["", "value"]
+        assert next(iter(table.columns[1].cells)) == "4.12"
+        words = {True: "yes", False: "no"}[landed]
+        expected = [f"landed and stands: {words}", f"success: {words}"]
+        if not landed:
+            expected += ["failure: slipped"]
+        assert lines.splitlines()[: len(expected)] == expected
 
 
 class TestRangeOfCommands:
@@ -306,35 +325,58 @@ class TestFigure:
         assert least == [0.7, 0.7]
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-def test_killed_and_resumed_equals_uninterrupted(tmp_path, jobs):
+STOPS = """
+import sys, time
+from icub_jump_env.evaluation import cli
+from icub_jump_env.evaluation.episodes import series
+
+def run_jobs(work, jobs, run=series.run_jobs):
+    for number, result in enumerate(run(work, jobs)):
+        if number == 2:
+            time.sleep(1000)
+        yield result
+
+if __name__ == "__main__":
+    series.run_jobs = run_jobs
+    cli.evaluate(sys.argv[1:])
+"""
+"""eval.py that makes no progress after two episodes, however slow the machine is."""
+
+
+@pytest.mark.parametrize(
+    ("jobs", "signals"),
+    [("1", [signal.SIGINT]), ("2", [signal.SIGTERM, signal.SIGKILL])],
+)
+def test_killed_and_resumed_equals_uninterrupted(tmp_path, jobs, signals):
     """The real thing: signals to a process, and the files compared byte for byte."""
-    if jobs == "2":
-        pytest.importorskip("ray")
-    command = [
-        sys.executable, str(REPOSITORY / "eval.py"), "--randomization", "hard", "--sensors",
-        "realistic", "--stand-time", "0.0", "--episodes", "24", "--jobs", jobs, "--results",
-    ]  # fmt: skip
+    program = tmp_path / "stops.py"
+    program.write_text(STOPS)
     whole, parts = tmp_path / "whole.jsonl", tmp_path / "parts.jsonl"
-    subprocess.run([*command, str(whole)], check=True, capture_output=True)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-        resume = ["--resume"] if parts.exists() else []
-        before = len(parts.read_text().splitlines()) if resume else 0
+    arguments = ["--sensors", "realistic", "--episodes", "7", "--results"]
+    cli.evaluate([*FAST, *arguments, str(whole)])
+    for number, interruption in enumerate(signals):
+        lines = 1 + 2 * (number + 1)
+        resume = ["--resume"] if number else []
         with subprocess.Popen(
-            [*command, str(parts), *resume],
+            [sys.executable, str(program), *FAST, *arguments, str(parts), "--jobs", jobs, *resume],
+            env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         ) as process:  # fmt: skip
-            while not parts.exists() or len(parts.read_text().splitlines()) < before + 3:
+            while not parts.exists() or len(parts.read_text().splitlines()) < lines:
                 assert process.poll() is None, process.stderr.read()
-                time.sleep(0.02)
-            process.send_signal(number)
+                time.sleep(0.01)
+            children = psutil.Process(process.pid).children(recursive=True)
+            assert len(children) >= int(jobs) - 1
+            process.send_signal(interruption)
             _, err = process.communicate(timeout=60)
-        assert process.returncode != 0
-        if number == signal.SIGINT:
-            assert "of 24 episodes are in" in err
-            assert "--resume" in err
-            assert "Traceback" not in err
-    subprocess.run([*command, str(parts), "--resume"], check=True, capture_output=True)
+        assert not psutil.wait_procs(children, timeout=60)[1]
+        if interruption == signal.SIGKILL:
+            assert process.returncode == -signal.SIGKILL
+        else:
+            assert process.returncode == 130
+            kept = f"{lines - 1} of 7 episodes are in {parts}; add --resume to the command"
+            assert err == f"{kept} to finish\ninterrupted\n"
+    cli.evaluate([*FAST, *arguments, str(parts), "--resume"])
     assert parts.read_bytes() == whole.read_bytes()
 
 

@@ -8,7 +8,7 @@ from conftest import jump
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation import study, sweep
+from icub_jump_env.evaluation.modes import study, sweep
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.actuators.torque_loops import CurrentControl, TorqueFeedback
 from icub_jump_env.simulation.sensor_models import SENSORS
@@ -61,7 +61,7 @@ class TestStudy:
         options = EvalOptions(
             SHORT, study="realism", episodes=2, seed=5, json=tmp_path / "s.json", plot=tmp_path
         )
-        study.run_study(options, console, progress)
+        study.run(options, (), console, progress)
         assert (tmp_path / "realism.png").stat().st_size > 10_000
         late, offset = json.loads((tmp_path / "s.json").read_text())["cases"]
         for controller in ("velocity", "torque"):
@@ -87,7 +87,7 @@ class TestSweep:
         monkeypatch.setattr(sweep, "DISPLACEMENTS", (0.09, 0.12))
         console, progress = consoles()
         options = EvalOptions(SHORT, sweep=True, json=tmp_path / "s.json", plot=tmp_path)
-        sweep.run_sweep(options, console, progress)
+        sweep.run(options, (), console, progress)
         assert (tmp_path / "sweep.png").stat().st_size > 10_000
         cells = json.loads((tmp_path / "s.json").read_text())["cells"]
         assert len(cells) == 8
@@ -103,6 +103,6 @@ class TestSweep:
         monkeypatch.setattr(sweep, "DISPLACEMENTS", (0.11,))
         console, progress = consoles()
         config = JumpConfig(momentum_control=False, stand_time=1.5)
-        sweep.run_sweep(EvalOptions(config, sweep=True), console, progress)
+        sweep.run(EvalOptions(config, sweep=True), (), console, progress)
         rise = 100 * jump(momentum_control=False, stand_time=1.5).jump["flight_height"]
         assert f"({rise:.2f})" in console.file.getvalue()

@@ -7,8 +7,8 @@ import pytest
 from contenders import episode, outcomes
 from scipy.stats import norm
 
-from icub_jump_env.evaluation.failures import Failure
-from icub_jump_env.evaluation.summary import Rate, Summary, by_command
+from icub_jump_env.evaluation.episodes.failures import Failure
+from icub_jump_env.evaluation.statistics.summary import Rate, Summary, by_command, command_labels
 
 
 @pytest.mark.parametrize(("count", "total"), [(0, 10), (7, 10), (200, 200), (190, 200)])
@@ -85,11 +85,16 @@ class TestByCommand:
         height = centimetres / 100
         for rounded in (height, math.nextafter(height, 0.0), math.nextafter(height, 1.0)):
             groups = by_command([episode(0, jump_height=rounded)])
-            assert list(groups) == [(centimetres, centimetres + 1)]
+            assert list(groups) == [(centimetres / 100, (centimetres + 1) / 100)]
 
     @pytest.mark.parametrize(
         ("height", "group"),
-        [(0.05, (5, 6)), (0.15 - 0.1, (5, 6)), (0.0499, (4, 5)), (0.0599999, (5, 6))],
+        [
+            (0.05, (0.05, 0.06)),
+            (0.15 - 0.1, (0.05, 0.06)),
+            (0.0499, (0.04, 0.05)),
+            (0.0599999, (0.05, 0.06)),
+        ],
     )
     def test_between_the_edges(self, height, group):
         assert list(by_command([episode(0, jump_height=height)])) == [group]
@@ -99,6 +104,16 @@ class TestByCommand:
         episodes = [episode(seed, jump_height=h) for seed, h in enumerate(heights)]
         groups = by_command(episodes)
         assert {key: [e.seed for e in group] for key, group in groups.items()} == {
-            (3, 4): [1, 3], (5, 6): [2, 4], (7, 8): [0, 5],
+            (0.03, 0.04): [1, 3], (0.05, 0.06): [2, 4], (0.07, 0.08): [0, 5],
         }  # fmt: skip
         assert list(groups) == sorted(groups)
+
+    def test_labels_say_the_range_or_the_single_command(self):
+        several = [episode(seed, jump_height=h) for seed, h in enumerate((0.072, 0.031))]
+        assert list(command_labels(several).values()) == ["3 to 4 cm", "7 to 8 cm"]
+        assert list(command_labels(several[:1]).values()) == ["7.2 cm"]
+
+
+def test_a_single_episode_has_no_rate():
+    assert [str(Rate(count, 1)) for count in (0, 1)] == ["no", "yes"]
+    assert Rate(1, 1).bounds == "-"

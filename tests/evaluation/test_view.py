@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from shows import SHORT, Clock, ScriptedScreen
 
-from icub_jump_env.evaluation import view
-from icub_jump_env.evaluation.rollout import make_env, run_episode, traced
-from icub_jump_env.evaluation.view import FRAME, MAX_LAG, Playback, Show
+from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.modes import view
+from icub_jump_env.evaluation.modes.view import FRAME, MAX_LAG, Playback, Show
 from icub_jump_env.simulation.viewers.screen import Command
 
 

@@ -13,8 +13,7 @@ import mujoco
 from mujoco.studio import launch_thread, messages, plugin, viewer_protocol, web_viewer
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
-from icub_jump_env.errors import ConfigError
-from icub_jump_env.simulation.viewers.screen import Caption, Command, CommandQueue, Stage
+from icub_jump_env.simulation.viewers.screen import Caption, Command, CommandQueue, Screen
 
 LOOPBACK = "127.0.0.1"
 
@@ -109,31 +108,24 @@ class Panel(plugin.ViewerPlugin):  # type: ignore[misc]
         imgui.End()
 
 
-class BrowserScreen:
+class BrowserScreen(Screen):
     """Serves a page on this machine that shows the jump.
 
     Attributes:
         address: Where the page is.
     """
 
-    def __init__(self, model: Any, port: int = 0) -> None:
-        """Start the server.
+    def __init__(self, model: Any) -> None:
+        """Start the server, at the first free port from 8080.
 
         Args:
             model: The model to show.
-            port: Where to listen; 0 takes the first free one from 8080.
-
-        Raises:
-            ConfigError: If the port is taken.
         """
-        if not 0 <= port <= 65535:
-            raise ConfigError("port", port, "a number from 0 to 65535")
-        self._stage = Stage(model)
-        self._commands = CommandQueue()
+        super().__init__(model)
         self._panel = Panel(self._commands)
         camera = mujoco.MjvCamera()
         self._stage.aim(camera)
-        config = viewer_protocol.ViewerConfig(title=_TITLE, gfx="web", http_port=port)
+        config = viewer_protocol.ViewerConfig(title=_TITLE, gfx="web", http_port=0)
         started: queue.SimpleQueue[int | BaseException] = queue.SimpleQueue()
 
         def serve(endpoint: Any) -> None:
@@ -156,17 +148,11 @@ class BrowserScreen:
         with contextlib.redirect_stdout(io.StringIO()):
             self._handle = launch_thread.launch_thread(serve)
             outcome = started.get()
-        if isinstance(outcome, RuntimeError):  # so Studio says that there is no port left
-            raise ConfigError("port", port, "a port that nobody listens on") from outcome
         if isinstance(outcome, BaseException):
             raise outcome
         self.address = f"http://{LOOPBACK}:{outcome}/"
         # The viewer has this model already.
         self._handle.model, self._handle.data = self._stage.model, self._stage.data
-
-    def show(self, data: Any) -> None:
-        """Show the present state of ``data`` from the next refresh on."""
-        self._stage.take(data)
 
     def refresh(self, caption: Caption) -> list[Command]:
         """Bring the page up to date; returns what the user asked for."""

@@ -6,7 +6,8 @@ import copy
 import enum
 import math
 import queue
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -82,17 +83,26 @@ class Stage:
         camera.elevation = math.degrees(math.asin(ahead[2]))
 
 
-class Screen(Protocol):
+class Screen(ABC):
     """Where the jump is shown."""
+
+    def __init__(self, model: Any) -> None:
+        """Prepare a world of its own to draw.
+
+        Args:
+            model: The model to show.
+        """
+        self._stage = Stage(model)
+        self._commands = CommandQueue()
 
     def show(self, data: Any) -> None:
         """Show the present state of ``data`` from the next refresh on."""
-        ...
+        self._stage.take(data)
 
+    @abstractmethod
     def refresh(self, caption: Caption) -> list[Command]:
         """Bring the picture up to date; returns what the user asked for."""
-        ...
 
+    @abstractmethod
     def close(self) -> None:
         """Free it."""
-        ...

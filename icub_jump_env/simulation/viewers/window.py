@@ -9,15 +9,18 @@ from typing import Any
 
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.simulation.opengl import has_display
-from icub_jump_env.simulation.viewers.screen import Caption, Command, CommandQueue, Stage
+from icub_jump_env.simulation.viewers.screen import Caption, Command, Screen
 
 CLOSING_TIME = 5.0
 """Longest time (s) to wait for a window to close."""
 
-_NO_WINDOW = "no window can be opened here (no display, or no OpenGL): view in the browser instead"
+_NO_WINDOW = (
+    "no window can be opened here: that needs a display and OpenGL; without them, "
+    "render_mode='rgb_array' makes pictures, and eval.py --view shows the jump in the browser"
+)
 
 
-class WindowScreen:
+class WindowScreen(Screen):
     """MuJoCo's own viewer."""
 
     def __init__(self, model: Any) -> None:
@@ -30,8 +33,7 @@ class WindowScreen:
         import glfw
         import mujoco.viewer
 
-        self._stage = Stage(model)
-        self._commands = CommandQueue()
+        super().__init__(model)
         self._keys = {
             glfw.KEY_SPACE: Command.PAUSE,
             glfw.KEY_RIGHT: Command.STEP,
@@ -57,10 +59,6 @@ class WindowScreen:
     def _press(self, key: int) -> None:
         if key in self._keys:
             self._commands.put(self._keys[key])
-
-    def show(self, data: Any) -> None:
-        """Show the present state of ``data`` from the next refresh on."""
-        self._stage.take(data)
 
     def refresh(self, caption: Caption) -> list[Command]:
         """Bring the window up to date; returns what the user asked for."""

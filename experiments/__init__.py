@@ -1,0 +1,1 @@
+"""What remakes the evidence in the documents: trainings, rivals, frontier, ablations."""

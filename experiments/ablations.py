@@ -1,0 +1,166 @@
+"""How training seeds and ablations differ, on episodes that no training has seen.
+
+    python -m experiments.ablations --jobs 2
+
+prints one row per kind of training in experiments/runs: what it reaches and what it
+gains over the baseline. An interrupted evaluation goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from experiments.seeds import TEST
+from experiments.shipped import CURVE_SUFFIX, RUNS, judged_config
+from icub_jump_env.checks import check_count
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.cli import guarded, parse
+from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
+from icub_jump_env.evaluation.episodes.series import Series
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT, seeds
+from icub_jump_env.evaluation.report.output import new_table, show
+from icub_jump_env.evaluation.statistics.intervals import CONFIDENCE, interquartile_mean
+
+_NAME = re.compile(r"(?P<kind>[\w-]+)-seed\d+")
+_EPISODES = 200
+_RESAMPLES = 5000
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AblationOptions:
+    """Compare kinds of training.
+
+    Attributes:
+        episodes: Of each policy.
+        jobs: Processes that work in parallel.
+    """
+
+    episodes: int = _EPISODES
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        check_count("episodes", self.episodes, 1, len(TEST))
+        check_count("jobs", self.jobs, 1)
+
+
+def compare_trainings(options: AblationOptions) -> None:
+    """Evaluate all runs and print the table."""
+    console, progress = Console(), Console(stderr=True)
+    files = sorted(RUNS.glob("*.safetensors"))
+    if not files:
+        raise ConfigError(
+            "runs", str(RUNS), "a folder with policies: python -m experiments.evidence"
+        )
+    kinds = defaultdict(list)
+    for contender in read_contenders([str(file) for file in files]):
+        if match := _NAME.fullmatch(contender.name):
+            kinds[match["kind"]].append(contender)
+    table = new_table(
+        1,
+        "training",
+        "seeds",
+        "success, %",
+        "gain",
+        "rise, cm",
+        "gain",
+        "soles, cm",
+        "gain",
+        "min",
+    )
+    for kind, members in sorted(kinds.items(), key=lambda item: item[0] not in CONTROLLERS):
+        config = judged_config(members[0])
+        baseline = _jumps(config, BASELINE, options, progress)
+        if kind in CONTROLLERS:
+            _add(table, f"{kind}, baseline", baseline)
+        jumps = np.stack([_jumps(config, member, options, progress) for member in members])
+        _add(table, kind, jumps, baseline, [_minutes(member.name) for member in members])
+    table.caption = (
+        f"{seeds(TEST[: options.episodes])}; interquartile means over the training "
+        "seeds; gain over the baseline in the same episodes, with its bootstrap interval of 95 %: "
+        "over training seeds and episodes (of few seeds: too narrow rather than too wide), or over "
+        "the episodes of a single training, whose luck it does not show"
+    )
+    show(console, table)
+
+
+def _jumps(
+    config: JumpConfig, contender: Contender, options: AblationOptions, progress: Console
+) -> Array:
+    """Success (%), rise and height of the soles (cm) of each episode (3, n)."""
+    series = Series(config, TEST[: options.episodes], contender)
+    found = [
+        (PERCENT * e.is_success, CM * e.jump["flight_height"], CM * e.jump["sole_height"])
+        for e in series.complete(options.jobs, progress)
+    ]
+    jumps: Array = np.nan_to_num(found).T  # without a flight: no height
+    return jumps
+
+
+def _minutes(name: str) -> float:
+    """What a training took; NaN if that is not known of a part of it."""
+    minutes = json.loads((RUNS / f"{name}{CURVE_SUFFIX}").read_text())["minutes"]
+    return float(np.sum(np.array(minutes, dtype=float)))
+
+
+def _add(
+    table: Table,
+    name: str,
+    jumps: Array,
+    baseline: Array | None = None,
+    minutes: Sequence[float] = (),
+) -> None:
+    """A row: jumps (seeds, 3, n) against those of the baseline (3, n)."""
+    known = [value for value in minutes if not math.isnan(value)]
+    cells = []
+    for quantity, decimals in enumerate((1, 2, 2)):
+        means = np.atleast_2d(jumps[..., quantity, :]).mean(axis=1)
+        cells.append(f"{interquartile_mean(means):.{decimals}f}")
+        if baseline is None:
+            cells.append("-")
+            continue
+        gains = jumps[:, quantity] - baseline[quantity]
+        values = (interquartile_mean(gains.mean(axis=1)), *runs_interval(gains))
+        gain, low, high = (f"{value:+.{decimals}f}" for value in values)
+        cells.append(f"{gain} ({low} to {high})")
+    table.add_row(
+        name, str(len(minutes) or "-"), *cells, f"{np.mean(known):.0f}" if known else "-"
+    )
+
+
+def runs_interval(gains: Array) -> tuple[float, float]:
+    """Interval of 95 % of the interquartile mean over training seeds, the same at each call.
+
+    A percentile bootstrap that draws both training seeds and episodes anew.
+
+    Args:
+        gains: Of each training in each episode (seeds, n).
+    """
+    rng = np.random.default_rng(0)
+    runs, episodes = gains.shape
+    means = [
+        gains[np.ix_(rng.integers(runs, size=runs), rng.integers(episodes, size=episodes))].mean(
+            axis=1
+        )
+        for _ in range(_RESAMPLES)
+    ]
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    low, high = np.percentile(interquartile_mean(means, axis=1), [tail, 100.0 - tail])
+    return float(low), float(high)
+
+
+if __name__ == "__main__":
+    guarded(lambda: compare_trainings(parse(AblationOptions, sys.argv[1:])))

@@ -1,0 +1,76 @@
+"""The pictures of the evidence."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from experiments.shipped import CURVE_SUFFIX
+from icub_jump_env.evaluation.figures.style import CONTENDERS, CONTROLLER, Figure, panels
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT
+from icub_jump_env.evaluation.statistics.intervals import interquartile_mean
+
+if TYPE_CHECKING:
+    from experiments.frontier import Point
+
+
+def frontier_figure(points: Sequence[Point]) -> Figure:
+    """Mean rise over the success rate; labels name command and displacement (cm)."""
+    figure, ((axis,),) = panels((6.5, 4.2))
+    names = dict.fromkeys(point.contender.name for point in points)
+    baseline, constant, _, policy, *_ = CONTENDERS
+    for name, color in zip(names, (baseline, constant, policy), strict=True):
+        shown = [p for p in points if p.contender.name == name]
+        shares = [PERCENT * p.summary.success.share for p in shown]
+        rises = [CM * p.summary.mean_rise for p in shown]
+        axis.plot(shares, rises, "o", color=color, label=name)
+        for point, share, rise in zip(shown, shares, rises, strict=True):
+            axis.annotate(
+                f"{CM * point.jump_height:g}/{CM * point.displacement:g}",
+                (share, rise),
+                textcoords="offset points",
+                xytext=(4, 3),
+                fontsize=7,
+                color=color,
+            )
+    axis.set(xlabel="success (%)", ylabel="mean CoM rise (cm)")
+    axis.set_title("command / displacement (cm)", fontsize=9)
+    axis.legend(frameon=False)
+    return figure
+
+
+def learning_curves(folder: Path) -> Figure:
+    """Each seed's evaluations as a thin line, their interquartile mean as a thick one.
+
+    Args:
+        folder: Holds the curves of the runs.
+    """
+    runs = {
+        controller: [
+            json.loads(file.read_text())["evaluations"]
+            for file in sorted(folder.glob(f"{controller}-seed*{CURVE_SUFFIX}"))
+        ]
+        for controller in CONTROLLERS
+    }
+    figure, ((left, right),) = panels((9.0, 3.5), columns=2)
+    for axis, name, scale, label in (
+        (left, "success", PERCENT, "success (%)"),
+        (right, "rise", CM, "mean CoM rise (cm)"),
+    ):
+        for controller, curves in runs.items():
+            if not curves:
+                continue
+            color = CONTROLLER[controller]
+            common = min(map(len, curves))
+            steps = np.array([point["timesteps"] for point in curves[0][:common]]) / 1000
+            values = scale * np.array([[point[name] for point in c[:common]] for c in curves])
+            axis.plot(steps, values.T, color=color, lw=0.6, alpha=0.5)
+            mean = interquartile_mean(values, axis=0)
+            axis.plot(steps, mean, color=color, lw=2.0, label=f"{controller}, {len(curves)} seeds")
+        axis.set(xlabel="steps (thousand)", ylabel=label)
+    left.legend(frameon=False, loc="lower right")
+    return figure

@@ -1,0 +1,26 @@
+"""What the trainings leave, what is shipped of it, and the jumps to judge it by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from agents.options import TASK
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.episodes.contender import Contender, as_trained
+
+REPOSITORY = Path(__file__).parents[1]
+
+PRETRAINED = REPOSITORY / "agents" / "pretrained"
+"""Shipped policies."""
+
+RUNS = REPOSITORY / "experiments" / "runs"
+"""The best policy of every training, and its learning curve."""
+
+CURVE_SUFFIX = ".curve.json"
+"""End of the names of the curves."""
+
+
+def judged_config(contender: Contender) -> JumpConfig:
+    """The task's commands and worlds, with what a policy depends on as in its training."""
+    assert contender.card is not None  # it was read from a file
+    return as_trained(contender.card, TASK)

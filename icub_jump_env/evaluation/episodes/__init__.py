@@ -1,0 +1,1 @@
+"""Running episodes: one, many, side by side, logged as they come."""

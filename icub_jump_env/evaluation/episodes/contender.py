@@ -1,0 +1,82 @@
+"""Who jumps: the baseline or a policy, with the name that tables and logs give it."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from icub_jump_env import policy
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.files import strict_json
+from icub_jump_env.policy import Policy, PolicyCard, load_policy
+from icub_jump_env.policy.card import TASK_FIELDS
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A policy and what it is called.
+
+    Attributes:
+        name: Its name in tables.
+        policy: What acts.
+        card: Its card; None for the baseline.
+    """
+
+    name: str
+    policy: Policy
+    card: PolicyCard | None = None
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether it is the pure controller."""
+        return self.card is None
+
+    @property
+    def identity(self) -> dict[str, str | None]:
+        """For logs and JSON: name, and hash of the card, in which that of the numbers is."""
+        digest = None
+        if self.card is not None:
+            digest = hashlib.sha256(strict_json(self.card.as_dict()).encode()).hexdigest()
+        return {"name": self.name, "sha256": digest}
+
+
+BASELINE = Contender("baseline", policy.BASELINE)
+
+
+def read_contenders(words: Sequence[str]) -> list[Contender]:
+    """The contenders of a command line.
+
+    Args:
+        words: The word baseline, and policy files. A file is called by its stem; where
+            several would be called the same, by the name of its folder as well.
+
+    Raises:
+        PolicyFileError: If a file is missing, damaged, or not a policy.
+        ConfigError: If two of them are called the same even so.
+    """
+    called = Counter(Path(word).stem for word in words)
+    contenders = []
+    for word in words:
+        if word == BASELINE.name:
+            contenders.append(BASELINE)
+            continue
+        path = Path(word)
+        loaded = load_policy(path)
+        alone = called[path.stem] == 1
+        name = path.stem if alone else f"{path.absolute().parent.name}-{path.stem}"
+        contenders.append(Contender(name, loaded, loaded.card))
+    if len({contender.name for contender in contenders}) < len(contenders):
+        raise ConfigError("compare", tuple(words), "policies of different names")
+    return contenders
+
+
+def as_trained(card: PolicyCard, jump: JumpConfig) -> JumpConfig:
+    """A jump, with what the policy depends on as it was in its training."""
+    return dataclasses.replace(
+        jump, **{field: getattr(card.config, field) for field in TASK_FIELDS}
+    )

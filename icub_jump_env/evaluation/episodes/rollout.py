@@ -1,0 +1,116 @@
+"""Episodes of a policy; without one, of the pure QP baseline."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.env import ICubJumpEnv
+from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
+from icub_jump_env.policy import BASELINE, Policy
+from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
+from icub_jump_env.snapshot import Snapshot
+
+Frame = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One finished episode.
+
+    Attributes:
+        seed: Seed of its reset.
+        jump_height: Commanded height (m).
+        outcome: ``stood``, ``fell``, ``no take-off`` or ``diverged``.
+        is_success: Whether it counts as a success.
+        reward: Sum of its rewards.
+        jump: Metrics by name, SI units.
+        failure: Class of the failure, if it was one.
+        world: What was drawn at the reset.
+        trace: Snapshots at the control rate, if asked for.
+    """
+
+    seed: int
+    jump_height: float
+    outcome: str
+    is_success: bool
+    reward: float
+    jump: dict[str, Any]
+    failure: Failure | None = None
+    world: dict[str, Any] = field(default_factory=dict)
+    trace: tuple[Snapshot, ...] = ()
+
+
+def make_env(config: JumpConfig) -> ICubJumpEnv:
+    """The environment of a configuration, without wrappers."""
+    return ICubJumpEnv(**dataclasses.asdict(config))
+
+
+def traced(config: JumpConfig) -> JumpConfig:
+    """The same jump, stepped once per control tick; with a zero action nothing else changes."""
+    return dataclasses.replace(config, agent_frequency=config.control_rate)
+
+
+def planned(config: JumpConfig) -> ComTrajectory:
+    """The vertical CoM trajectory that a configuration with a single command asks for."""
+    return plan_com_trajectory(
+        config.commanded_height, config.com_displacement, config.com_scaling
+    )
+
+
+def run_episode(
+    env: ICubJumpEnv,
+    seed: int,
+    policy: Policy = BASELINE,
+    trace: bool = False,
+    on_step: Callable[[ICubJumpEnv], None] | None = None,
+    hold: int = 1,
+) -> Episode:
+    """Run one episode.
+
+    Args:
+        env: The environment.
+        seed: Seed of the reset.
+        policy: What acts.
+        trace: Whether to take a snapshot at each step.
+        on_step: Called after the reset and after each step.
+        hold: Steps that an action is held, where the environment is stepped faster than
+            the policy acts.
+
+    Returns:
+        The episode.
+    """
+    snapshots = []
+    observation, info = env.reset(seed=seed)
+    world = info["world"]
+    terminated, total = False, 0.0
+    for step in itertools.count():
+        if trace:
+            snapshots.append(env.snapshot())
+        if on_step is not None:
+            on_step(env)
+        if terminated:
+            break
+        if step % hold == 0:
+            action = policy(observation)
+        observation, reward, terminated, _, info = env.step(action)
+        total += reward
+    height, outcome, jump = info["jump_height"], info["outcome"], info["jump"]
+    return Episode(
+        seed=seed,
+        jump_height=height,
+        outcome=outcome,
+        is_success=info["is_success"],
+        reward=total,
+        jump=jump,
+        failure=failure_of(outcome, jump, height),
+        world=world,
+        trace=tuple(snapshots),
+    )

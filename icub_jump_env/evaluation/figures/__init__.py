@@ -1,0 +1,1 @@
+"""All pictures; only these modules know matplotlib."""

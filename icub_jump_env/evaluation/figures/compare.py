@@ -1,0 +1,56 @@
+"""The picture of a comparison: success and rise over the command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.figures.style import CONTENDERS, Figure, panels
+from icub_jump_env.evaluation.quantities import CM, PERCENT
+from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_labels
+from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
+
+
+def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
+    """Success rates with Wilson intervals by command, and every episode's rise.
+
+    Args:
+        episodes: The episodes of each contender, by its name.
+    """
+    figure, ((left, right),) = panels((9.0, 3.8), columns=2)
+    shift = 0.8 / len(episodes)
+    for number, (name, series) in enumerate(episodes.items()):
+        color = CONTENDERS[number % len(CONTENDERS)]
+        groups = by_command(series)
+        rates = [Summary.of(group).success for group in groups.values()]
+        places = np.arange(len(groups)) + (number - (len(episodes) - 1) / 2) * shift
+        shares = np.array([PERCENT * rate.share for rate in rates])
+        bounds = np.array([rate.interval for rate in rates]).T * PERCENT
+        errors = np.abs(bounds - shares)
+        left.bar(places, shares, 0.9 * shift, yerr=errors, color=color, label=name, capsize=2)
+        names = [text.removesuffix(" cm") for text in command_labels(series).values()]
+        left.set_xticks(range(len(groups)), names)
+        for landed, marker in ((True, "."), (False, "x")):
+            shown = [e for e in series if e.jump["landed"] == landed]
+            if not shown:
+                continue
+            right.plot(
+                [CM * e.jump_height for e in shown],
+                [CM * e.jump["flight_height"] for e in shown],
+                marker,
+                ms=4,
+                alpha=0.7,
+                color=color,
+                label=None if landed else f"{name}, fallen",
+            )
+    commands = [CM * e.jump_height for series in episodes.values() for e in series]
+    ends = np.array([min(commands), max(commands)])
+    right.plot(ends, ends, color="k", lw=0.8, label="command")
+    right.plot(ends, MIN_HEIGHT_RATIO * ends, "k:", lw=0.8, label="least for a success")
+    left.set(xlabel="command (cm)", ylabel="success (%)", ylim=(0, 103))
+    right.set(xlabel="command (cm)", ylabel="CoM rise (cm)")
+    left.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    right.legend(frameon=False, fontsize=8)
+    return figure

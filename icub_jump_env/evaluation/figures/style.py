@@ -1,0 +1,90 @@
+"""What all pictures share: colours, layout, and how a drawing suits a page."""
+
+from __future__ import annotations
+
+import io
+from contextlib import AbstractContextManager
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Figure
+
+from icub_jump_env.config import ControllerName
+
+INK = "#24303c"
+MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"
+"""Of curves: what happened, what was wanted, and what stands beside them."""
+
+CONTROLLER: dict[ControllerName, str] = {"velocity": MEASURED, "torque": DESIRED}
+CONTENDERS = ("0.55", "tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
+"""Of those that are compared, in their order; the first one is the baseline."""
+
+PAGE = {
+    "ink": (INK, INK, "#d5dde5"),
+    "measured": (MEASURED, MEASURED, "#5cb8d6"),
+    "desired": (DESIRED, "#c03648", "#f4818d"),
+    "accent": (ACCENT, "#5d6b82", "#97a6bd"),
+}
+"""Colours as drawn, on a light page, on a dark page. Text of these colours has a contrast of at
+least 4.5 to the page."""
+
+DPI = 150
+
+_ON_A_PAGE: dict[Any, Any] = {
+    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor"), INK),
+    **dict.fromkeys(("xtick.color", "ytick.color"), INK),
+    "svg.fonttype": "path",  # looks alike whatever fonts the reader has
+    "svg.hashsalt": "icub-jump",  # the same jump makes the same page
+}
+
+
+def panels(
+    size: tuple[float, float], rows: int = 1, columns: int = 1, **layout: Any
+) -> tuple[Figure, Any]:
+    """A figure and its axes, (rows, columns)."""
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    with matplotlib.rc_context({"axes.spines.top": False, "axes.spines.right": False}):
+        return figure, figure.subplots(rows, columns, squeeze=False, **layout)
+
+
+def describe(axis: Axes, title: str, unit: str, abscissa: str = "time (s)") -> None:
+    """Name what a panel shows."""
+    axis.set_title(title, fontsize=10)
+    axis.set(xlabel=abscissa, ylabel=unit)
+
+
+def mark_takeoff(axis: Axes, time: float) -> None:
+    """Draw a line at a time (s)."""
+    axis.axvline(time, color=ACCENT, lw=0.8, ls=":")
+
+
+def on_a_page() -> AbstractContextManager[None]:
+    """Figures drawn meanwhile suit :func:`svg`."""
+    return matplotlib.rc_context(_ON_A_PAGE)
+
+
+def page_colors() -> str:
+    """CSS that defines a variable for each colour of :data:`PAGE`, as the page's scheme wants."""
+    light, dark = (
+        ":root{" + ";".join(f"--{name}:{colors[scheme]}" for name, colors in PAGE.items()) + "}"
+        for scheme in (1, 2)
+    )
+    return f"{light}@media(prefers-color-scheme:dark){{{dark}}}"
+
+
+def svg(figure: Figure) -> tuple[bytes, int, int]:
+    """A drawing that takes on the colour scheme of the page around it.
+
+    Returns:
+        The drawing, its width and its height (CSS pixels).
+    """
+    buffer = io.StringIO()
+    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(buffer, format="svg", transparent=True, metadata=nothing)
+    drawing = buffer.getvalue()
+    for name, (drawn, *_) in PAGE.items():
+        drawing = drawing.replace(drawn, f"var(--{name})")
+    drawing = drawing.replace("<defs>", f"<defs><style>{page_colors()}</style>", 1)
+    width, height = (round(96 * inches) for inches in figure.get_size_inches())
+    return drawing.encode(), width, height

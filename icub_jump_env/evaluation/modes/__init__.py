@@ -1,0 +1,1 @@
+"""What eval.py can do, a module each."""

@@ -1,0 +1,1 @@
+"""How results leave the program: console, files, and the page of ``--report``."""

@@ -1,0 +1,1 @@
+"""What episodes say together, against each other, and against the paper."""

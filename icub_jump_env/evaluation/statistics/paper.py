@@ -1,0 +1,96 @@
+"""Our jump beside the paper's (section IV), and beside the same jump done otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from icub_jump_env.config import ControllerName, JumpConfig
+from icub_jump_env.evaluation.episodes.rollout import Episode, planned
+from icub_jump_env.evaluation.quantities import QUANTITIES, SCALE, shown
+
+_COMMANDED = {"takeoff_velocity": 0.89, "takeoff_time": 0.43}
+
+PAPER: dict[ControllerName, dict[str, float]] = {
+    "velocity": {
+        "flight_height": 0.035, "sole_height": 0.037, "ballistic_height": 0.03, **_COMMANDED,
+    },
+    "torque": {"flight_height": 0.016, "sole_height": 0.023, **_COMMANDED},
+}  # fmt: skip
+"""The paper's numbers of the nominal jump, 4 cm at a displacement of 11 cm, by metric; SI units.
+
+Heights are those of the simulation (section IV-A), take-off velocity and time those commanded
+(section IV, Fig. 2). The ballistic height was computed from the take-off speed measured on the
+real robot (section IV-B), which jumped with the velocity controller only.
+"""
+
+SOURCES = {
+    "flight_height": "simulation",
+    "sole_height": "simulation",
+    "takeoff_velocity": "command",
+    "takeoff_time": "command",
+    "ballistic_height": "real robot",
+}
+"""Where they come from."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity.
+
+    Attributes:
+        quantity: What it is.
+        unit: Unit of the numbers.
+        paper: The paper's value, if it gives one.
+        ours: Ours as configured.
+        difference: Ours minus the paper's, if both are simulations of the same jump.
+        other: That of the jump it is compared with.
+        source: Where the paper's value comes from.
+    """
+
+    quantity: str
+    unit: str
+    paper: float | None
+    ours: float
+    difference: float | None
+    other: float
+    source: str
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Paper, ours, difference and other; the paper's with the digits that it gives."""
+        return (
+            "-" if self.paper is None else f"{self.paper:g}",
+            shown(self.ours, self.unit),
+            shown(self.difference, self.unit, signed=True),
+            shown(self.other, self.unit),
+        )
+
+
+def comparison_rows(config: JumpConfig, ours: Episode, other: Episode) -> list[Row]:
+    """A row for each quantity.
+
+    Args:
+        config: Our configuration. There is a difference to the paper only where it is the
+            paper's jump.
+        ours: The episode as configured.
+        other: The episode it is compared with.
+    """
+    rows = []
+    same_jump = planned(config) == planned(JumpConfig())
+    for quantity, metric, unit in QUANTITIES:
+        scale, source = SCALE.get(unit, 1.0), SOURCES.get(metric, "")
+        value, beside = (scale * float(episode.jump[metric]) for episode in (ours, other))
+        paper = PAPER[config.controller].get(metric)
+        reference = None if paper is None else scale * paper
+        difference = None
+        if reference is not None and same_jump and source != "real robot":
+            difference = value - reference
+        rows.append(Row(quantity, unit, reference, value, difference, beside, source))
+    return rows
+
+
+def verdict(ours: Episode, other: Episode, momentum_control: bool) -> str:
+    """Which arm of the ablation stands, in a sentence; ``other`` has the constraint switched."""
+    arms = (ours, other) if momentum_control else (other, ours)
+    with_, without = ("stands" if arm.jump["landed"] else "falls" for arm in arms)
+    return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
