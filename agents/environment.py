@@ -12,13 +12,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.control.jump import RESIDUAL_TIME
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
 from icub_jump_env.observation import OBSERVATION_LIMIT, entry_scales
+from icub_jump_env.planning.residual import RESIDUAL_TIME
+from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 from icub_jump_env.policy import Policy
 from icub_jump_env.policy.fields import AXES
-from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 
 Array = NDArray[np.float32]
 Env = gymnasium.Env[Any, Any]
@@ -34,7 +34,7 @@ def acting_steps(config: JumpConfig) -> int:
         plan_com_trajectory(height, config.com_displacement, config.com_scaling).duration
         for height in config.jump_heights
     )
-    if config.residual_phases == "all":
+    if config.residual.phases == "all":
         longest += RESIDUAL_TIME
     return math.ceil(longest * config.agent_frequency)
 

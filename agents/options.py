@@ -18,7 +18,7 @@ from icub_jump_env.checks import (
     check_numbers,
     store,
 )
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import JumpConfig, Shortcuts
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.observation import SLICES, entry_scales
 from icub_jump_env.policy.fields import (
@@ -116,6 +116,7 @@ class TrainOptions:
 
     Attributes:
         env: The jump; every field of the environment's configuration is a flag.
+        shortcuts: Fields inside its groups; they end up there.
         ppo: How PPO learns.
         inputs: What the policy sees: the whole observation, or command and time alone.
         axes: Axes of the action that it uses.
@@ -133,6 +134,7 @@ class TrainOptions:
     """
 
     env: Annotated[JumpConfig, tyro.conf.arg(name="")] = TASK
+    shortcuts: Annotated[Shortcuts, tyro.conf.arg(name="")] = field(default_factory=Shortcuts)
     ppo: PPOOptions = field(default_factory=PPOOptions)
     inputs: Inputs = "all"
     axes: tuple[AxisName, ...] = ("forward", "vertical")
@@ -145,14 +147,15 @@ class TrainOptions:
     config: Path | None = None
 
     def __post_init__(self) -> None:
+        store(self, env=self.env.replace(**vars(self.shortcuts)), shortcuts=Shortcuts())
         check_choice("inputs", self.inputs, ("all", "command"))
         store(self, axes=check_axes(self.axes))
         check_count("timesteps", self.timesteps, 1, 1_000_000_000)
         check_count("seed", self.seed, 0, 2**32 - 1)
         check_count("jobs", self.jobs, 1, 1000)
         check_count("checkpoint_every", self.checkpoint_every, 1)
-        if self.env.render_mode is not None:
-            raise ConfigError("render_mode", self.env.render_mode, "not in a training")
+        if self.env.rendering.mode is not None:
+            raise ConfigError("render_mode", self.env.rendering.mode, "not in a training")
         if self.ppo.episodes % self.jobs:
             raise ConfigError("jobs", self.jobs, f"a divisor of ppo.episodes={self.ppo.episodes}")
         if self.resume is not None and self.run not in (None, self.resume):
@@ -161,7 +164,7 @@ class TrainOptions:
     @property
     def folder(self) -> Path:
         """Folder of the run."""
-        default = Path("runs") / f"{self.env.controller}-seed{self.seed}"
+        default = Path("runs") / f"{self.env.controller_name}-seed{self.seed}"
         return self.resume or self.run or default
 
     @property
@@ -175,7 +178,7 @@ class TrainOptions:
     def as_dict(self) -> dict[str, Any]:
         """What the result depends on, for JSON."""
         values = dataclasses.asdict(self)
-        for name in ("run", "resume", "config"):
+        for name in ("run", "resume", "config", "shortcuts"):
             del values[name]
         return values
 

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from icub_jump_env.config import ControllerName, JumpConfig
-from icub_jump_env.control.config import CONTROLLERS, SolverName, TorqueConfig
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import CONTROLLERS, ControllerName, SolverName, TorqueConfig
 from icub_jump_env.control.qp.check import check_solution
 from icub_jump_env.control.qp.solvers import make_solver
 from icub_jump_env.control.torque import TorqueController

@@ -26,7 +26,7 @@ from experiments.rivals import best_constant, open_loop
 from experiments.seeds import TEST
 from experiments.shipped import CURVE_SUFFIX, PRETRAINED, REPOSITORY, RUNS
 from icub_jump_env.checks import check_count
-from icub_jump_env.config import ControllerName
+from icub_jump_env.control.config import ControllerName
 from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import Contender, read_contenders

@@ -26,7 +26,7 @@ from experiments.figures import frontier_figure
 from experiments.seeds import TEST, TUNING
 from experiments.shipped import PRETRAINED, judged_config
 from icub_jump_env.checks import check_count
-from icub_jump_env.config import ControllerName
+from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.episodes.failures import failure_of
@@ -42,7 +42,7 @@ from icub_jump_env.evaluation.report.output import (
 )
 from icub_jump_env.evaluation.statistics.difference import Difference
 from icub_jump_env.evaluation.statistics.summary import Summary
-from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
+from icub_jump_env.metrics.jump import SuccessConfig
 
 Episodes = Sequence[Episode]
 
@@ -146,7 +146,7 @@ def run_frontier(options: FrontierOptions) -> None:
 
 def judged(episode: Episode) -> Episode:
     """The same episode, a success if it would be one after the policy's command."""
-    failure = failure_of(episode.outcome, episode.jump, POLICY_COMMAND)
+    failure = failure_of(episode.outcome, episode.jump, POLICY_COMMAND, SuccessConfig())
     return dataclasses.replace(episode, jump_height=POLICY_COMMAND, is_success=failure is None)
 
 
@@ -193,7 +193,7 @@ def render(points: Sequence[Point]) -> Table:
         )
     table.caption = (
         f"{seeds(_GRID_SEEDS)}; success: landed after at least "
-        f"{CM * MIN_HEIGHT_RATIO * POLICY_COMMAND:g} cm"
+        f"{CM * SuccessConfig().height_ratio * POLICY_COMMAND:g} cm"
     )
     return table
 

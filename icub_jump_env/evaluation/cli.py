@@ -37,7 +37,8 @@ def _name_or_json(
 ) -> tyro.constructors.PrimitiveConstructorSpec[Any] | None:
     """Models are given by name, or by their fields as JSON."""
     options = get_args(info.type)
-    if len(options) != 2 or not dataclasses.is_dataclass(options[1]):
+    kinds = tuple(kind for kind in options if dataclasses.is_dataclass(kind))
+    if not kinds or len(kinds) != len(options) - 1:
         return None
     names = get_args(options[0])
 
@@ -53,7 +54,7 @@ def _name_or_json(
         nargs=1,
         metavar=f"{{{','.join(names)}}}|JSON",
         instance_from_str=from_words,
-        is_instance=lambda value: isinstance(value, str | options[1]),
+        is_instance=lambda value: isinstance(value, str) or dataclasses.is_dataclass(value),
         str_from_instance=lambda value: [
             value if isinstance(value, str) else json.dumps(dataclasses.asdict(value))
         ],

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from icub_jump_env.checks import check_count
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.checks import check_count, store
+from icub_jump_env.config import JumpConfig, Shortcuts
 from icub_jump_env.errors import ConfigError
 
 STUDY_EPISODES = 20
@@ -18,7 +18,7 @@ STUDY_EPISODES = 20
 MOST_EPISODES = 1_000_000
 
 _MODES = ("compare", "study", "sweep", "report", "view")
-_COMMON = ("config", "seed")
+_COMMON = ("config", "shortcuts", "seed")
 _USED = {
     "nominal": ("episodes", "policy", "json", "plot", "video"),
     "statistics": ("episodes", "policy", "jobs", "results", "resume", "json", "plot", "video"),
@@ -48,6 +48,7 @@ class EvalOptions:
 
     Attributes:
         config: The jump; every field of the environment's configuration is a flag.
+        shortcuts: Fields inside its groups; they end up there.
         episodes: Number of episodes; in a study, of each case (default 20).
         seed: Seed of the first episode; the next ones count up.
         policy: Let this policy act; the jump is set up as its card says.
@@ -69,6 +70,7 @@ class EvalOptions:
     """
 
     config: Annotated[JumpConfig, tyro.conf.arg(name="")] = field(default_factory=JumpConfig)
+    shortcuts: Annotated[Shortcuts, tyro.conf.arg(name="")] = field(default_factory=Shortcuts)
     episodes: int | None = None
     seed: int = 0
     policy: Path | None = None
@@ -85,6 +87,7 @@ class EvalOptions:
     video: Path | None = None
 
     def __post_init__(self) -> None:
+        store(self, config=self.config.replace(**vars(self.shortcuts)), shortcuts=Shortcuts())
         if self.episodes is not None:
             check_count("episodes", self.episodes, 1, MOST_EPISODES)
         check_count("seed", self.seed, 0)
@@ -114,8 +117,8 @@ class EvalOptions:
                 shown = str(value) if isinstance(value, Path) else value
                 raise ConfigError(option.name, shown, f"not with {where}")
         for name in _CHOSEN_BY_MODE.get(self.mode, ()):
-            value = getattr(self.config, name)
-            if value != getattr(JumpConfig(), name):
+            value = self.config.value_of(name)
+            if value != JumpConfig().value_of(name):
                 raise ConfigError(name, value, f"not with --{self.mode}, which varies it itself")
 
     @property

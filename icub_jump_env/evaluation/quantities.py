@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import get_args
 
-from icub_jump_env.config import ControllerName
+from icub_jump_env.control.config import ControllerName
 
 CONTROLLERS: tuple[ControllerName, ...] = get_args(ControllerName)
 

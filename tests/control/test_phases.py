@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from icub_jump_env.control.minimum_jerk import MinimumJerk
 
 from icub_jump_env.control.jump import landing_posture
-from icub_jump_env.control.minimum_jerk import MinimumJerk
 from icub_jump_env.control.phases import ContactThresholds, Phase, PhaseMachine
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.robot import facts

@@ -8,17 +8,17 @@ import pytest
 from conftest import jump
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from icub_jump_env.control.contact import ContactLimits, contact_rows
+from icub_jump_env.control.solvers import make_solver
+from icub_jump_env.reference.com_reference import ComReference
+from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.control.contact import ContactLimits, contact_rows
 from icub_jump_env.control.qp import QPStatus, QuadraticProgram, check_solution
-from icub_jump_env.control.solvers import make_solver
 from icub_jump_env.control.torque import TorqueController, TorqueGains
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.evaluation.episodes.rollout import make_env
-from icub_jump_env.reference.com_reference import ComReference
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 from icub_jump_env.robot import facts
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model

@@ -5,8 +5,6 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from icub_jump_env.errors import CommandNotScalableError
 from icub_jump_env.reference.com_trajectory import (
     ACCELERATION_CURVE,
     DISPLACEMENT_CURVE,
@@ -14,6 +12,8 @@ from icub_jump_env.reference.com_trajectory import (
     takeoff_velocity,
 )
 from icub_jump_env.robot.facts import GRAVITY
+
+from icub_jump_env.errors import CommandNotScalableError
 
 CURVES = [DISPLACEMENT_CURVE, ACCELERATION_CURVE]
 

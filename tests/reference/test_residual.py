@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from icub_jump_env.reference.com_reference import ComReference
 from icub_jump_env.reference.com_trajectory import plan_com_trajectory
 from icub_jump_env.reference.residual import ResidualFilter

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
@@ -77,6 +76,5 @@ def read_contenders(words: Sequence[str]) -> list[Contender]:
 
 def as_trained(card: PolicyCard, jump: JumpConfig) -> JumpConfig:
     """A jump, with what the policy depends on as it was in its training."""
-    return dataclasses.replace(
-        jump, **{field: getattr(card.config, field) for field in TASK_FIELDS}
-    )
+    trained = {field: card.config.value_of(field) for field in TASK_FIELDS}
+    return jump.replace(**trained | {"controller": card.config.controller})

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any
 
-from icub_jump_env.metrics.jump import MIN_FLIGHT_TIME, MIN_HEIGHT_RATIO
+from icub_jump_env.metrics.jump import SuccessConfig
 
 OVER_ROTATION = math.radians(5.0)
 """A robot that turned further than this in the air fell because of it; with the momentum
@@ -30,7 +30,9 @@ class Failure(StrEnum):
     TOO_LOW = "too low"
 
 
-def failure_of(outcome: str, jump: Mapping[str, Any], jump_height: float) -> Failure | None:
+def failure_of(
+    outcome: str, jump: Mapping[str, Any], jump_height: float, success: SuccessConfig
+) -> Failure | None:
     """The failure class of a finished episode, or None for a success.
 
     A jump that did not land is classed by what came before the fall, else by its
@@ -40,13 +42,14 @@ def failure_of(outcome: str, jump: Mapping[str, Any], jump_height: float) -> Fai
         outcome: ``info["outcome"]``.
         jump: ``info["jump"]``.
         jump_height: Commanded height (m).
+        success: What counts as a success.
     """
     if outcome == "diverged":
         return Failure.DIVERGED
-    if jump["flight_time"] < MIN_FLIGHT_TIME:
+    if jump["flight_time"] < success.flight_time:
         return Failure.NO_TAKEOFF
     if jump["landed"]:
-        low = jump["flight_height"] < MIN_HEIGHT_RATIO * jump_height
+        low = jump["flight_height"] < success.height_ratio * jump_height
         return Failure.TOO_LOW if low else None
     if abs(jump["flight_rotation"]) > OVER_ROTATION:
         return Failure.OVER_ROTATED

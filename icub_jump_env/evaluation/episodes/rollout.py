@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
+from icub_jump_env.planning.scaled_curve import ComTrajectory, plan_com_trajectory
 from icub_jump_env.policy import BASELINE, Policy
-from icub_jump_env.reference.com_trajectory import ComTrajectory, plan_com_trajectory
 from icub_jump_env.snapshot import Snapshot
 
 Frame = NDArray[np.uint8]
@@ -55,7 +55,7 @@ def make_env(config: JumpConfig) -> ICubJumpEnv:
 
 def traced(config: JumpConfig) -> JumpConfig:
     """The same jump, stepped once per control tick; with a zero action nothing else changes."""
-    return dataclasses.replace(config, agent_frequency=config.control_rate)
+    return dataclasses.replace(config, agent_frequency=config.controller_config.frequency)
 
 
 def planned(config: JumpConfig) -> ComTrajectory:
@@ -110,7 +110,7 @@ def run_episode(
         is_success=info["is_success"],
         reward=total,
         jump=jump,
-        failure=failure_of(outcome, jump, height),
+        failure=failure_of(outcome, jump, height, env.config.success),
         world=world,
         trace=tuple(snapshots),
     )

@@ -106,7 +106,13 @@ class Series:
         )
         digest = hashlib.sha256(asked.encode()).hexdigest()[:8]
         height = commands(*self.config.jump_heights).replace(" ", "")
-        words = (self.config.controller, self.contender.name, height, world(self.config), digest)
+        words = (
+            self.config.controller_name,
+            self.contender.name,
+            height,
+            world(self.config),
+            digest,
+        )
         return Path("results") / f"{'-'.join(words)}.jsonl"
 
 

@@ -10,14 +10,15 @@ from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.figures.style import CONTENDERS, Figure, panels
 from icub_jump_env.evaluation.quantities import CM, PERCENT
 from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_labels
-from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
+from icub_jump_env.metrics.jump import SuccessConfig
 
 
-def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
+def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessConfig) -> Figure:
     """Success rates with Wilson intervals by command, and every episode's rise.
 
     Args:
         episodes: The episodes of each contender, by its name.
+        success: What counts as a success.
     """
     figure, ((left, right),) = panels((9.0, 3.8), columns=2)
     shift = 0.8 / len(episodes)
@@ -48,7 +49,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]]) -> Figure:
     commands = [CM * e.jump_height for series in episodes.values() for e in series]
     ends = np.array([min(commands), max(commands)])
     right.plot(ends, ends, color="k", lw=0.8, label="command")
-    right.plot(ends, MIN_HEIGHT_RATIO * ends, "k:", lw=0.8, label="least for a success")
+    right.plot(ends, success.height_ratio * ends, "k:", lw=0.8, label="least for a success")
     left.set(xlabel="command (cm)", ylabel="success (%)", ylim=(0, 103))
     right.set(xlabel="command (cm)", ylabel="CoM rise (cm)")
     left.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))

@@ -14,7 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from icub_jump_env.config import CONTROL_RATES, ControllerName, JumpConfig
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.episodes.rollout import (
     Episode,
     make_env,
@@ -32,7 +33,7 @@ from icub_jump_env.evaluation.figures.style import (
     panels,
 )
 from icub_jump_env.evaluation.quantities import CM, commands
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.robot import Robot
 from icub_jump_env.snapshot import Snapshot
 
 Trace = Sequence[Snapshot]
@@ -48,8 +49,8 @@ def paper_figures(
         episodes: Traced episodes ``with`` and ``without`` the momentum constraint.
         seed: Their seed.
     """
-    trace = episodes["with" if config.momentum_control else "without"].trace
-    number = _LAUNCH[config.controller].figure.lower().replace(". ", "")
+    trace = episodes["with" if config.controller_config.momentum_control else "without"].trace
+    number = _LAUNCH[config.controller_name].figure.lower().replace(". ", "")
     return {
         "fig1_com_reference.png": partial(com_reference_figure, config),
         f"{number}_launch.png": partial(launch_figure, config, trace),
@@ -82,26 +83,28 @@ class _Shown(NamedTuple):
     quantity: str
     command: str
     unit: str
-    limit: NDArray[np.float64]
+    limit: Callable[[Robot], NDArray[np.float64]]
 
 
 _LAUNCH: dict[ControllerName, _Shown] = {
     "velocity": _Shown(
-        "Fig. 2", "joint_velocity", "joint_velocity_command", "rad/s", facts.VELOCITY_LIMIT
+        "Fig. 2", "joint_velocity", "joint_velocity_command", "rad/s", lambda r: r.velocity_limit
     ),
-    "torque": _Shown("Fig. 3", "joint_torque", "joint_torque_command", "Nm", facts.EFFORT_LIMIT),
+    "torque": _Shown(
+        "Fig. 3", "joint_torque", "joint_torque_command", "Nm", lambda r: r.effort_limit
+    ),
 }
 
 
 def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
     """Fig. 2 (joint velocities) or Fig. 3 (joint torques) and CoM height, desired and measured."""
-    shown = _LAUNCH[config.controller]
+    shown = _LAUNCH[config.controller_name]
     figure, ((*joints, height),) = panels((13.0, 3.4), columns=4)
     _draw_joints(joints, config, trace)
     _draw_height(height, config, trace)
     duration = planned(config).duration
     figure.suptitle(
-        f"{shown.figure}: {config.controller} approach, take-off commanded at {duration:.2f} s"
+        f"{shown.figure}: {config.controller_name} approach, take-off commanded at {duration:.2f} s"
     )
     return figure
 
@@ -109,11 +112,7 @@ def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
 def realistic(config: JumpConfig) -> JumpConfig:
     """The jump of Fig. 4: as on the real robot, which jumped with the velocity approach."""
     return dataclasses.replace(
-        config,
-        controller="velocity",
-        actuators="realistic",
-        sensors="realistic",
-        agent_frequency=config.control_frequency or CONTROL_RATES["velocity"],
+        config.for_controller("velocity"), actuators="realistic", sensors="realistic"
     )
 
 
@@ -141,17 +140,17 @@ def robot_figure(config: JumpConfig, episode: Episode) -> Figure:
 
 
 def _draw_joints(axes: Sequence[Axes], config: JumpConfig, trace: Trace) -> None:
-    shown = _LAUNCH[config.controller]
+    shown, robot = _LAUNCH[config.controller_name], config.robot_value
     time = np.array([s.time for s in trace])
     launch = time <= planned(config).duration
     for axis, joint in zip(axes, ("ankle_pitch", "knee", "hip_pitch"), strict=True):
-        index = facts.JOINT_INDEX[f"l_{joint}"]
+        index = robot.joint_names.index(f"l_{joint}")
         measured = np.array([getattr(s, shown.quantity)[index] for s in trace])
         # A snapshot holds the command that led to it, issued one control period before.
         desired = np.array([getattr(s, shown.command)[index] for s in trace[1:]])
         axis.plot(time[launch], measured[launch], color=MEASURED)
         axis.plot(time[:-1][launch[1:]], desired[launch[1:]], color=DESIRED, ls="--")
-        limit = shown.limit[index]
+        limit = shown.limit(robot)[index]
         if float(np.abs(measured[launch]).max()) > 0.8 * limit:
             sign = np.sign(measured[launch][-1])
             axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":")

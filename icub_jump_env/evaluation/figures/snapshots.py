@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
@@ -69,7 +68,7 @@ def take_snapshots(config: JumpConfig, episode: Episode) -> list[Shot]:
         if step in moments.values():
             pictures[step] = env.render()
 
-    visible = dataclasses.replace(traced(config), render_mode="rgb_array")
+    visible = traced(config).replace(render_mode="rgb_array")
     with contextlib.closing(make_env(visible)) as env:
         run_episode(env, episode.seed, on_step=look)
     return [Shot(name, episode.trace[step].time, pictures[step]) for name, step in moments.items()]

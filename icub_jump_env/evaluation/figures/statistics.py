@@ -10,7 +10,7 @@ from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.figures.style import ACCENT, DESIRED, MEASURED, Figure, panels
 from icub_jump_env.evaluation.quantities import CM, DEG
-from icub_jump_env.metrics.jump import MIN_HEIGHT_RATIO
+from icub_jump_env.metrics.jump import SuccessConfig
 
 _MARKERS = {
     None: "o",
@@ -25,13 +25,14 @@ _MARKERS = {
 }
 
 
-def statistics_figure(episodes: Sequence[Episode]) -> Figure:
+def statistics_figure(episodes: Sequence[Episode], success: SuccessConfig) -> Figure:
     """Rise and rotation of every episode; failures by class.
 
     The rise is drawn in units of the command where each episode has its own.
 
     Args:
         episodes: The episodes.
+        success: What counts as a success.
     """
     alike = len({e.jump_height for e in episodes}) == 1
     # A length of 1 on the x axis: a centimetre, or the command.
@@ -51,7 +52,7 @@ def statistics_figure(episodes: Sequence[Episode]) -> Figure:
                 label=f"{kind or 'success'}: {len(shown)}",
             )
     axis.axvline(command, color=ACCENT, lw=0.8, label="command")
-    least = MIN_HEIGHT_RATIO * command
+    least = success.height_ratio * command
     axis.axvline(least, color=ACCENT, lw=0.8, ls=":", label="least for a success")
     axis.set_xlabel("CoM rise (cm)" if alike else "CoM rise / commanded height")
     axis.set_ylabel("rotation in flight (deg)")

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from icub_jump_env.config import ControllerName
+from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.figures.style import CONTROLLER, Figure, panels
 from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, DEG
 

@@ -10,7 +10,7 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Figure
 
-from icub_jump_env.config import ControllerName
+from icub_jump_env.control.config import ControllerName
 
 INK = "#24303c"
 MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"

@@ -42,12 +42,12 @@ def run(
     def figure() -> Figure:
         from icub_jump_env.evaluation.figures.compare import compare_figure
 
-        return compare_figure(arms)
+        return compare_figure(arms, options.config.success)
 
     write_results(options, progress, found, {"compare.png": figure})
     say(
         console,
-        f"{commands(*config.jump_heights)} jump, {config.controller} controller, randomization "
+        f"{commands(*config.jump_heights)} jump, {config.controller_name} controller, randomization "
         f"{world(config)}, {seeds(options.seeds)} for each",
     )
     show(console, render(arms))

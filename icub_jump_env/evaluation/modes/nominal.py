@@ -69,9 +69,10 @@ def run_nominal(
         The arm as asked for and the other one.
     """
     if contender.is_baseline:
-        switched = dataclasses.replace(config, momentum_control=not config.momentum_control)
-        named = ((c, "with" if c.momentum_control else "without") for c in (config, switched))
-        jumps = [(name, c, contender) for c, name in named]
+        switched = config.replace(momentum_control=not _constrained(config))
+        jumps = [
+            ("with" if _constrained(c) else "without", c, contender) for c in (config, switched)
+        ]
     else:
         jumps = [("policy", config, contender), ("baseline", config, BASELINE)]
     arms = []
@@ -84,6 +85,10 @@ def run_nominal(
             arms.append(Arm(name, arm_config, acting, episode))
             progress.advance(task)
     return arms[0], arms[1]
+
+
+def _constrained(config: JumpConfig) -> bool:
+    return config.controller_config.momentum_control
 
 
 def run(
@@ -99,15 +104,15 @@ def run(
     ours, other = (arm.episode for arm in arms)
     rows = comparison_rows(config, ours, other)
     write_results(options, progress, report(arms, rows), _figures(arms, options))
-    title = f"{commands(*config.jump_heights)} jump, {config.controller} controller"
+    title = f"{commands(*config.jump_heights)} jump, {config.controller_name} controller"
     if contender.is_baseline:
-        column = f"{'no' if config.momentum_control else 'with'} eq. 3d"
+        column = f"{'no' if _constrained(config) else 'with'} eq. 3d"
     else:
         launch = f"{CM * planned(config).displacement:.3g} cm"
         title, column = f"{title} with {contender.name}, after {launch}", "baseline"
     show(console, render_table(rows, f"{title}; the paper's: 4 cm after 11 cm", column))
     if contender.is_baseline:
-        say(console, verdict(ours, other, config.momentum_control))
+        say(console, verdict(ours, other, _constrained(config)))
 
 
 def _figures(arms: Sequence[Arm], options: EvalOptions) -> dict[str, Callable[[], Figure]]:
@@ -147,7 +152,7 @@ def report(arms: Sequence[Arm], rows: Sequence[Row]) -> dict[str, Any]:
         "arms": {
             arm.name: {
                 "policy": arm.contender.identity,
-                "momentum_control": arm.config.momentum_control,
+                "momentum_control": _constrained(arm.config),
                 "outcome": arm.episode.outcome,
                 "is_success": arm.episode.is_success,
                 "failure": arm.episode.failure,

@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import JumpConfig, RenderConfig
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.figures.paper import (
     base_pitch_figure,
@@ -80,7 +80,7 @@ def write_report(folder: Path, config: JumpConfig, seed: int, console: Console) 
     """
     check_report(folder)
     configs = [
-        dataclasses.replace(config, controller=controller, render_mode=None)
+        dataclasses.replace(config.for_controller(controller), rendering=RenderConfig())
         for controller in CONTROLLERS
     ]
     realistic(configs[0])  # refuses before any work what cannot be drawn of it
@@ -117,12 +117,14 @@ def _jump(config: JumpConfig, seed: int, console: Console) -> dict[str, Any]:
         )
     apex = next((shot for shot in shots if shot.name == "Apex"), shots[0])
     return {
-        "controller": config.controller,
+        "controller": config.controller_name,
         "ends": _OUTCOMES[ours.episode.outcome],
         "rows": {
             row.quantity: row for row in comparison_rows(config, ours.episode, switched.episode)
         },
-        "verdict": verdict(ours.episode, switched.episode, config.momentum_control),
+        "verdict": verdict(
+            ours.episode, switched.episode, config.controller_config.momentum_control
+        ),
         "video": _video(config, seed, console),
         "poster": photo(apex.picture),
         "moments": _moments(ours, shots),
@@ -138,7 +140,7 @@ def _moments(arm: Arm, shots: Sequence[Shot]) -> list[tuple[Shot, Picture]]:
     for shot in shots:
         height, width, _ = shot.close_up.shape
         alt = (
-            f"The iCub, {arm.config.controller} controller, {arm.name} the momentum constraint: "
+            f"The iCub, {arm.config.controller_name} controller, {arm.name} the momentum constraint: "
             f"{shot.name.lower()} at {shot.time:.3f} s"
         )
         moments.append((shot, Picture(photo(shot.close_up), width, height, alt)))
@@ -146,7 +148,7 @@ def _moments(arm: Arm, shots: Sequence[Shot]) -> list[tuple[Shot, Picture]]:
 
 
 def _launch(arm: Arm) -> Picture:
-    controller = arm.config.controller
+    controller = arm.config.controller_name
     number, quantity = {"velocity": (2, "velocities"), "torque": (3, "torques")}[controller]
     return drawing(
         launch_figure(arm.config, arm.episode.trace),
@@ -171,7 +173,7 @@ def _robot(config: JumpConfig, seed: int) -> Picture:
 
 
 def _base_pitch(*arms: Arm) -> Picture:
-    controller = arms[0].config.controller
+    controller = arms[0].config.controller_name
     ends = " and ".join(
         f"{arm.name} the momentum constraint the robot {_OUTCOMES[arm.episode.outcome]}"
         for arm in sorted(arms, key=lambda arm: arm.name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shlex
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -39,7 +39,7 @@ def run(
     def figure() -> Figure:
         from icub_jump_env.evaluation.figures.statistics import statistics_figure
 
-        return statistics_figure(episodes)
+        return statistics_figure(episodes, options.config.success)
 
     write_results(options, progress, found, {"statistics.png": figure})
     title, table, lines = render(episodes, options, contender)
@@ -57,7 +57,7 @@ def render(
     """
     config, summary = options.config, Summary.of(episodes)
     title = (
-        f"{commands(*config.jump_heights)} jump, {config.controller} controller, "
+        f"{commands(*config.jump_heights)} jump, {config.controller_name} controller, "
         f"{contender.name}, randomization {world(config)}, {seeds(options.seeds)}"
     )
     several = len(episodes) > 1
@@ -86,20 +86,23 @@ def render(
 
 def replay_arguments(config: JumpConfig, seed: int) -> str:
     """Arguments of eval.py that play one episode again."""
-    words = []
+    return shlex.join([*_flags(config, JumpConfig()), "--seed", str(seed)])
+
+
+def _flags(config: Any, default: Any, prefix: str = "--") -> list[str]:
+    """Flags for what differs between two dataclasses of one kind; of a model by name, JSON."""
+    words: list[str] = []
     for field in dataclasses.fields(config):
-        value = getattr(config, field.name)
-        if value == field.default:
+        value, usual = getattr(config, field.name), getattr(default, field.name)
+        if value == usual:
             continue
-        flag = field.name.replace("_", "-")
+        flag = prefix + field.name.replace("_", "-")
         if isinstance(value, bool):
-            words.append(f"--{flag}" if value else f"--no-{flag}")
-            continue
-        words.append(f"--{flag}")
-        if dataclasses.is_dataclass(value) and not isinstance(value, type):
-            words.append(strict_json(dataclasses.asdict(value)))
-        elif isinstance(value, tuple):
-            words += map(str, value)
+            words.append(flag if value else flag.replace("--", "--no-", 1))
+        elif dataclasses.is_dataclass(value) and type(value) is type(usual):
+            words += _flags(value, usual, f"{flag}.")
+        elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+            words += [flag, strict_json(dataclasses.asdict(value))]
         else:
-            words.append(str(value))
-    return shlex.join([*words, "--seed", str(seed)])
+            words += [flag, *map(str, value if isinstance(value, tuple) else (value,))]
+    return words

@@ -16,7 +16,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from icub_jump_env.config import ControllerName, JumpConfig
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
 from icub_jump_env.evaluation.episodes.rollout import Episode
@@ -144,7 +145,8 @@ def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
     work, owners = [], []
     for index, case in enumerate(all_cases):
         for controller in CONTROLLERS:
-            config = dataclasses.replace(options.config, controller=controller, **case.changes)
+            jump = options.config.for_controller(controller)
+            config = dataclasses.replace(jump, **case.changes)
             for seed in _seeds(config, options):
                 work.append(Job(config, seed))
                 owners.append((index, controller))

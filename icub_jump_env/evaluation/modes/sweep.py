@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from icub_jump_env.config import ControllerName
+from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
 from icub_jump_env.evaluation.episodes.rollout import Episode
@@ -35,7 +35,14 @@ def run(options: EvalOptions, _: Sequence[Contender], console: Console, progress
     cells: list[Cell] = list(itertools.product(CONTROLLERS, HEIGHTS, DISPLACEMENTS))
     names = ("controller", "jump_height", "com_displacement")
     changes: list[dict[str, Any]] = [dict(zip(names, cell, strict=True)) for cell in cells]
-    work = [Job(dataclasses.replace(options.config, **change), options.seed) for change in changes]
+    jumps = {name: options.config.for_controller(name) for name in CONTROLLERS}
+    work = [
+        Job(
+            dataclasses.replace(jumps[controller], jump_height=height, com_displacement=rise),
+            options.seed,
+        )
+        for controller, height, rise in cells
+    ]
     done = run_all(work, options.jobs, progress)
     found = [
         change | {"outcome": episode.outcome, "failure": episode.failure, "jump": episode.jump}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from pathlib import Path
 
 from rich.console import Console
@@ -63,10 +62,8 @@ def record_video(
     check_video(file)
     import imageio.v3 as iio
 
-    config = dataclasses.replace(
-        config,
-        render_mode="rgb_array",
-        stand_time=min(config.stand_time, AFTER_LANDING),
+    config = config.replace(
+        render_mode="rgb_array", stand_time=min(config.success.stand_time, AFTER_LANDING)
     )
     frames = []
     with progress_display(console) as progress, contextlib.closing(make_env(config)) as env:

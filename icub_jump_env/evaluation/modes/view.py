@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import math
 import signal
 import sys
@@ -259,7 +258,7 @@ def view(config: JumpConfig, seed: int, console: Console, policy: Policy = BASEL
     browser = in_browser()
     # Any mode loads the meshes; this one opens nothing before it is asked for a picture. A step
     # per control tick makes slow motion smooth.
-    env = make_env(dataclasses.replace(traced(config), render_mode="rgb_array"))
+    env = make_env(traced(config).replace(render_mode="rgb_array"))
     with (
         contextlib.closing(env),
         ctrl_c() as enough,

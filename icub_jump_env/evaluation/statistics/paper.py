@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from icub_jump_env.config import ControllerName, JumpConfig
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.episodes.rollout import Episode, planned
 from icub_jump_env.evaluation.quantities import QUANTITIES, SCALE, shown
 
@@ -80,7 +81,7 @@ def comparison_rows(config: JumpConfig, ours: Episode, other: Episode) -> list[R
     for quantity, metric, unit in QUANTITIES:
         scale, source = SCALE.get(unit, 1.0), SOURCES.get(metric, "")
         value, beside = (scale * float(episode.jump[metric]) for episode in (ours, other))
-        paper = PAPER[config.controller].get(metric)
+        paper = PAPER[config.controller_name].get(metric)
         reference = None if paper is None else scale * paper
         difference = None
         if reference is not None and same_jump and source != "real robot":
