@@ -14,7 +14,7 @@ from icub_jump_env.config import JumpConfig, Shortcuts
 from icub_jump_env.errors import ConfigError
 
 STUDY_EPISODES = 20
-"""Episodes of each case of a study, where errors and noise are drawn anew."""
+"""Episodes of each case of a study."""
 MOST_EPISODES = 1_000_000
 
 _MODES = ("compare", "study", "sweep", "report", "view")
@@ -31,7 +31,7 @@ _USED = {
 """Options that each mode uses, beside the common ones and its own."""
 
 _CHOSEN_BY_MODE = {
-    "study": ("controller", "actuators", "sensors", "command_delay"),
+    "study": ("controller",),
     "sweep": ("controller", "jump_height", "com_displacement", "randomization"),
     "report": ("controller",),
 }
@@ -54,7 +54,8 @@ class EvalOptions:
         policy: Let this policy act; the jump is set up as its card says.
         compare: Compare policies on the same episodes: files, and the word baseline.
         jobs: Processes that work in parallel.
-        study: How the realism of actuators and sensors changes the jump.
+        study: What changes the jump: the realism of actuators and sensors, the task as cost or
+            constraint, what ends the launch, the robot.
         sweep: Desired height against displacement, for both controllers.
         report: Write one self-contained HTML page into this folder (extra 'video').
         view: Show the jump live, in the browser or in a window.
@@ -76,7 +77,7 @@ class EvalOptions:
     policy: Path | None = None
     compare: tuple[str, ...] | None = None
     jobs: int = 1
-    study: Literal["realism"] | None = None
+    study: Literal["realism", "constraints", "launch_end", "robots"] | None = None
     sweep: bool = False
     report: Path | None = None
     view: bool = False

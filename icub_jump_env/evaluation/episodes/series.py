@@ -20,6 +20,7 @@ from icub_jump_env.evaluation.quantities import commands
 from icub_jump_env.evaluation.report.output import progress_display, say
 from icub_jump_env.evaluation.report.provenance import provenance, source, versions
 from icub_jump_env.files import strict_json
+from icub_jump_env.simulation.randomization import Randomization
 from icub_jump_env.simulation.sensor_models import SensorConfig
 
 
@@ -126,6 +127,11 @@ def varies(config: JumpConfig) -> bool:
     low, high = config.jump_heights
     drawn = config.randomization_config.varies or low < high
     return drawn or config.sensor_config != SensorConfig()
+
+
+def perturbed(config: JumpConfig) -> JumpConfig:
+    """The same jump, with link masses that differ a little from episode to episode."""
+    return dataclasses.replace(config, randomization=Randomization(link_mass=(0.999, 1.001)))
 
 
 def warn_if_alike(config: JumpConfig, progress: Console) -> None:

@@ -23,14 +23,14 @@ from icub_jump_env.evaluation.figures.paper import (
 )
 from icub_jump_env.evaluation.figures.snapshots import Shot, take_snapshots
 from icub_jump_env.evaluation.figures.style import on_a_page
-from icub_jump_env.evaluation.modes.nominal import Arm, run_nominal
+from icub_jump_env.evaluation.modes.nominal import REPETITIONS, Arm, run_nominal
 from icub_jump_env.evaluation.modes.video import SLOW_MOTION, check_video, record_video
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.quantities import CONTROLLERS
 from icub_jump_env.evaluation.report.output import check_writable, progress_display, say
 from icub_jump_env.evaluation.report.page import Picture, data_uri, drawing, photo, render
 from icub_jump_env.evaluation.report.provenance import command, versions
-from icub_jump_env.evaluation.statistics.paper import comparison_rows, verdict
+from icub_jump_env.evaluation.statistics.paper import MOMENTUM_EQUATION, comparison_rows, verdict
 from icub_jump_env.files import write_file
 
 PAGE = "index.html"
@@ -100,6 +100,7 @@ def write_report(folder: Path, config: JumpConfig, seed: int, console: Console) 
             versions=versions(),
             command=shlex.join(command()),
             slow_motion=SLOW_MOTION,
+            repetitions=REPETITIONS,
         )
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / PAGE
@@ -118,13 +119,12 @@ def _jump(config: JumpConfig, seed: int, console: Console) -> dict[str, Any]:
     apex = next((shot for shot in shots if shot.name == "Apex"), shots[0])
     return {
         "controller": config.controller_name,
+        "equation": MOMENTUM_EQUATION[config.controller_name],
         "ends": _OUTCOMES[ours.episode.outcome],
         "rows": {
-            row.quantity: row for row in comparison_rows(config, ours.episode, switched.episode)
+            row.quantity: row for row in comparison_rows(config, ours.repeated, switched.repeated)
         },
-        "verdict": verdict(
-            ours.episode, switched.episode, config.controller_config.momentum_control
-        ),
+        "verdict": verdict(config, ours.episode, switched.episode),
         "video": _video(config, seed, console),
         "poster": photo(apex.picture),
         "moments": _moments(ours, shots),

@@ -1,14 +1,13 @@
-"""The realism study: one imperfection after the other, for both controllers.
+"""Studies: the jump in several cases, for both controllers.
 
-The paper names three reasons why its torque controller did not jump on the real robot:
-computation time, the tuning of the low-level torque control, and errors of the torques
-estimated from force/torque sensors. Each is switched on here by itself.
+Where nothing is random the jump is repeated with link masses that differ by 0.1 %: how much
+the result moves then says what a single episode is worth.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -18,102 +17,79 @@ from rich.table import Table
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.contender import Contender
+from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.episodes.series import varies
+from icub_jump_env.evaluation.episodes.series import perturbed, varies
 from icub_jump_env.evaluation.figures.study import realism_figure
+from icub_jump_env.evaluation.modes import cases
+from icub_jump_env.evaluation.modes.cases import Case
 from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
-from icub_jump_env.evaluation.quantities import CONTROLLERS, commands, number
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, commands, number, spread
 from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
-from icub_jump_env.evaluation.statistics.summary import Summary
-from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig
-from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
-from icub_jump_env.simulation.sensor_models import SensorConfig, SensorError
-
-_LEVER = 0.05
-"""Moment error (Nm) that goes with a force error of 1 N, as in the realistic preset."""
+from icub_jump_env.evaluation.statistics.paper import PAPER
+from icub_jump_env.evaluation.statistics.summary import Rate, Summary
 
 
 @dataclass(frozen=True)
-class Case:
-    """One imperfection.
+class Study:
+    """A question, and the cases that answer it.
 
     Attributes:
-        group: What it belongs to.
-        label: What is changed in it.
-        changes: Fields of the configuration that make it.
+        title: Title of the table.
+        cases: Makes the cases.
+        columns: What is shown of each controller: heading and cell.
+        beside_paper: Whether the paper's numbers stand above.
     """
 
-    group: str
-    label: str
-    changes: dict[str, Any]
+    title: str
+    cases: Callable[[], list[Case]]
+    columns: dict[str, Callable[[Summary], str]]
+    beside_paper: bool = False
 
 
-def cases() -> list[Case]:
-    """All cases of the study."""
-    realistic = ACTUATORS["realistic"]
-    current = dataclasses.replace(realistic, torque_loop=ACTUATORS["current_control"].torque_loop)
-    groups: dict[str, dict[str, dict[str, Any]]] = {
-        "computation time": {_ticks(ticks): {"command_delay": ticks} for ticks in range(4)},
-        "low-level torque control": {
-            "ideal": {"actuators": "ideal"},
-            **{
-                f"feedback, {bandwidth:g} Hz": {"actuators": _feedback(bandwidth)}
-                for bandwidth in (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5)
-            },
-            "current control": {"actuators": "current_control"},
-        },
-        # Errors of the feet's sensors reach the joints through the torque feedback.
-        "force/torque sensors": {
-            **{
-                label: {"actuators": "torque_feedback", "sensors": sensors}
-                for label, sensors in _sensor_errors().items()
-            },
-            "offset 80 N, current c.": {"actuators": "current_control", "sensors": _offset(80.0)},
-        },
-        "motors": {
-            "rated": {"actuators": "ideal"},
-            "DC, limits raised": {"actuators": "dc_motor"},
-            "DC, original limits": {"actuators": "original_limits"},
-        },
-        "all together": {
-            f"{loop}{words}": {"actuators": actuators, "sensors": "realistic"} | delay
-            for delay, words in (({}, ""), ({"command_delay": 2}, ", 2 ticks"))
-            for loop, actuators in (("torque feedback", realistic), ("current control", current))
-        },
-    }
-    return [
-        Case(group, label, changes)
-        for group, labelled in groups.items()
-        for label, changes in labelled.items()
-    ]
+def _median(metric: str, unit: str) -> Callable[[Summary], str]:
+    return lambda summary: number(summary.median(metric), unit)
 
 
-def _ticks(ticks: int) -> str:
-    return f"delay of {ticks} control tick{'' if ticks == 1 else 's'}"
+def _rise_spread(summary: Summary) -> str:
+    low, _, high = summary.percentiles["flight_height"]
+    return spread(low, high, "cm")
 
 
-def _feedback(bandwidth: float) -> ActuatorConfig:
-    loop = TorqueFeedback(bandwidth=bandwidth)
-    return dataclasses.replace(ACTUATORS["torque_feedback"], torque_loop=loop)
+def _share(rate: Rate) -> str:
+    """A share, with its interval unless it is the whole."""
+    whole = number(rate.share, "%")
+    if rate.count == rate.total:
+        return whole
+    low, high = (number(bound, "%") for bound in rate.interval)
+    return f"{whole} ({low}-{high})"
 
 
-def _sensor_errors() -> dict[str, SensorConfig]:
-    return {
-        "no error": SensorConfig(),
-        **{f"offset {force:g} N": _offset(force) for force in (10.0, 20.0, 40.0, 80.0)},
-        **{f"drift {rate:g} N/s": _drift(rate) for rate in (20.0, 80.0)},
-        **{f"calibration {gain:.0%}": SensorConfig(force_gain=gain) for gain in (0.05, 0.1, 0.2)},
-    }
+_RISE = {"rise": _median("flight_height", "cm"), "10 to 90 %": _rise_spread}
+_ROTATION = {"rot.": _median("flight_rotation", "deg")}
+_LANDED = {"landed": lambda summary: _share(summary.landed)}
 
-
-def _offset(force: float) -> SensorConfig:
-    return SensorConfig(force=SensorError(bias=force), moment=SensorError(bias=_LEVER * force))
-
-
-def _drift(rate: float) -> SensorConfig:
-    return SensorConfig(force=SensorError(drift=rate), moment=SensorError(drift=_LEVER * rate))
+STUDIES = {
+    "realism": Study("Realism study", cases.realism, _RISE | _ROTATION | _LANDED),
+    "constraints": Study(
+        "Task and momentum as costs (soft) or constraints (hard)",
+        cases.constraints,
+        _RISE
+        | {"success": lambda summary: _share(summary.success)}
+        | {"unsolved": _median("solver_failures", "steps")},
+    ),
+    "launch_end": Study("What ends the launch", cases.launch_end, _RISE | _ROTATION | _LANDED),
+    "robots": Study(
+        "The iCubs of icub-models",
+        cases.robots,
+        _RISE | {"soles": _median("sole_height", "cm")} | _LANDED,
+        beside_paper=True,
+    ),
+}
+"""Studies by name."""
 
 
 @dataclass(frozen=True)
@@ -130,24 +106,37 @@ class CaseResult:
 
 
 def run(options: EvalOptions, _: Sequence[Contender], console: Console, progress: Console) -> None:
-    """Run ``eval.py --study realism``."""
-    results = run_cases(options, progress)
+    """Run ``eval.py --study``."""
+    assert options.study is not None  # else it were another mode
+    study = STUDIES[options.study]
+    results = run_cases(study, options, progress)
     found = {"cases": [result.as_dict() for result in results]}
-    write_results(options, progress, found, {"realism.png": partial(realism_figure, results)})
-    show(console, render(results, options))
-    if options.plot is None:
+    figures = {}
+    if options.study == "realism":
+        figures = {"realism.png": partial(realism_figure, results)}
+    write_results(options, progress, found, figures)
+    show(console, render(study, results, options))
+    for line in never_took_off(results):
+        say(console, line)
+    if figures and options.plot is None:
         say(progress, "for the picture add --plot FOLDER")
 
 
-def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
+def run_cases(study: Study, options: EvalOptions, progress: Console) -> list[CaseResult]:
     """Run every case with both controllers."""
-    all_cases = cases()
+    all_cases = study.cases()
+    for name in {name for case in all_cases for name in case.changes}:
+        value = options.config.value_of(name)
+        if value != JumpConfig().value_of(name):
+            raise ConfigError(name, value, f"not with --study {options.study}, which varies it")
+    count = options.episodes or STUDY_EPISODES
     work, owners = [], []
     for index, case in enumerate(all_cases):
         for controller in CONTROLLERS:
-            jump = options.config.for_controller(controller)
-            config = dataclasses.replace(jump, **case.changes)
-            for seed in _seeds(config, options):
+            config = options.config.for_controller(controller).replace(**case.changes)
+            if not varies(config):
+                config = perturbed(config)
+            for seed in range(options.seed, options.seed + count):
                 work.append(Job(config, seed))
                 owners.append((index, controller))
     episodes: dict[tuple[int, ControllerName], list[Episode]] = {o: [] for o in owners}
@@ -159,37 +148,47 @@ def run_cases(options: EvalOptions, progress: Console) -> list[CaseResult]:
     ]
 
 
-def _seeds(config: JumpConfig, options: EvalOptions) -> range:
-    """One episode is enough where nothing is random."""
-    episodes = (options.episodes or STUDY_EPISODES) if varies(config) else 1
-    return range(options.seed, options.seed + episodes)
-
-
-def render(results: Sequence[CaseResult], options: EvalOptions) -> Table:
+def render(study: Study, results: Sequence[CaseResult], options: EvalOptions) -> Table:
     """The table for the terminal."""
-    headings = [
-        f"{c[:3]}.\n{quantity}" for c in CONTROLLERS for quantity in ("rise", "rot.", "landed")
-    ]
-    title = f"Realism study, {commands(*options.config.jump_heights)} jump"
+    headings = [f"{c[:3]}.\n{heading}" for c in CONTROLLERS for heading in study.columns]
+    title = study.title
+    if study is not STUDIES["constraints"]:
+        title = f"{title}, {commands(*options.config.jump_heights)} jump"
     table = new_table(1, "", *headings, title=title)
+    if study.beside_paper:
+        shown = {"rise": "flight_height", "soles": "sole_height"}
+        cells = [
+            f"{CM * PAPER[c][shown[heading]]:g}" if heading in shown else ""
+            for c in CONTROLLERS
+            for heading in study.columns
+        ]
+        table.add_row("the paper's simulation", *cells, end_section=True)
     group = ""
     for result in results:
         if result.case.group != group:
             group = result.case.group
             table.add_section()
             table.add_row(f"[bold]{group}[/bold]")
-        cells = [cell for c in CONTROLLERS for cell in _cells(result.summaries[c])]
-        table.add_row(f"  {result.case.label}", *cells)
+        cells = [cell(result.summaries[c]) for c in CONTROLLERS for cell in study.columns.values()]
+        table.add_row(f"{'  ' if group else ''}{result.case.label}", *cells)
+    count = options.episodes or STUDY_EPISODES
     table.caption = (
-        "vel., tor.: velocity and torque controller; rise of the CoM in cm and rotation in "
-        "flight in deg: medians; landed: share in %"
+        "vel., tor.: velocity and torque controller; rise of the CoM in cm, rotation in flight in "
+        f"deg, control ticks without a solution: medians of {count} episodes; landed, success: "
+        "share in % (95 % interval). Where nothing else is random, link masses vary by 0.1 %"
     )
     return table
 
 
-def _cells(summary: Summary) -> tuple[str, str, str]:
-    return (
-        number(summary.median("flight_height"), "cm"),
-        number(summary.median("flight_rotation"), "deg"),
-        number(summary.landed.share, "%"),
-    )
+def never_took_off(results: Sequence[CaseResult]) -> list[str]:
+    """A line for each case in which a robot stayed on the ground."""
+    lines = []
+    for result in results:
+        for controller, summary in result.summaries.items():
+            stayed = len(summary.failures.get(Failure.NO_TAKEOFF, ()))
+            if stayed:
+                total = summary.landed.total
+                lines.append(
+                    f"{controller}, {result.case.label}: no flight in {stayed} of {total}"
+                )
+    return lines

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.episodes.rollout import Episode, planned
 from icub_jump_env.evaluation.quantities import QUANTITIES, SCALE, shown
+from icub_jump_env.evaluation.statistics.summary import Summary
 
 _COMMANDED = {"takeoff_velocity": 0.89, "takeoff_time": 0.43}
 
@@ -23,6 +25,9 @@ Heights are those of the simulation (section IV-A), take-off velocity and time t
 (section IV, Fig. 2). The ballistic height was computed from the take-off speed measured on the
 real robot (section IV-B), which jumped with the velocity controller only.
 """
+
+MOMENTUM_EQUATION: dict[ControllerName, str] = {"velocity": "3d", "torque": "6d"}
+"""The equation of the constraint on the angular momentum."""
 
 SOURCES = {
     "flight_height": "simulation",
@@ -42,9 +47,10 @@ class Row:
         quantity: What it is.
         unit: Unit of the numbers.
         paper: The paper's value, if it gives one.
-        ours: Ours as configured.
+        ours: Median of ours as configured; of landings, the share.
+        spread: 10th and 90th percentile.
         difference: Ours minus the paper's, if both are simulations of the same jump.
-        other: That of the jump it is compared with.
+        other: As ``ours``, of the jump it is compared with.
         source: Where the paper's value comes from.
     """
 
@@ -52,46 +58,57 @@ class Row:
     unit: str
     paper: float | None
     ours: float
+    spread: tuple[float, float]
     difference: float | None
     other: float
     source: str
 
     @property
-    def cells(self) -> tuple[str, str, str, str]:
-        """Paper, ours, difference and other; the paper's with the digits that it gives."""
+    def cells(self) -> tuple[str, ...]:
+        """Paper, ours, spread, difference, other; the paper's with the digits that it gives."""
+        low, high = (shown(bound, self.unit) for bound in self.spread)
         return (
             "-" if self.paper is None else f"{self.paper:g}",
             shown(self.ours, self.unit),
+            low if low == high else f"{low} to {high}",
             shown(self.difference, self.unit, signed=True),
             shown(self.other, self.unit),
         )
 
 
-def comparison_rows(config: JumpConfig, ours: Episode, other: Episode) -> list[Row]:
+def comparison_rows(
+    config: JumpConfig, ours: Sequence[Episode], other: Sequence[Episode]
+) -> list[Row]:
     """A row for each quantity.
 
     Args:
         config: Our configuration. There is a difference to the paper only where it is the
             paper's jump.
-        ours: The episode as configured.
-        other: The episode it is compared with.
+        ours: Episodes as configured.
+        other: Episodes they are compared with.
     """
     rows = []
     same_jump = planned(config) == planned(JumpConfig())
+    summaries = [Summary.of(episodes) for episodes in (ours, other)]
     for quantity, metric, unit in QUANTITIES:
         scale, source = SCALE.get(unit, 1.0), SOURCES.get(metric, "")
-        value, beside = (scale * float(episode.jump[metric]) for episode in (ours, other))
+        low, value, high = (scale * bound for bound in summaries[0].percentiles[metric])
+        beside = scale * summaries[1].median(metric)
+        if metric == "landed":
+            value, beside = (scale * summary.landed.share for summary in summaries)
+            low = high = value
         paper = PAPER[config.controller_name].get(metric)
         reference = None if paper is None else scale * paper
         difference = None
         if reference is not None and same_jump and source != "real robot":
             difference = value - reference
-        rows.append(Row(quantity, unit, reference, value, difference, beside, source))
+        rows.append(Row(quantity, unit, reference, value, (low, high), difference, beside, source))
     return rows
 
 
-def verdict(ours: Episode, other: Episode, momentum_control: bool) -> str:
+def verdict(config: JumpConfig, ours: Episode, other: Episode) -> str:
     """Which arm of the ablation stands, in a sentence; ``other`` has the constraint switched."""
-    arms = (ours, other) if momentum_control else (other, ours)
+    arms = (ours, other) if config.controller_config.momentum_control else (other, ours)
     with_, without = ("stands" if arm.jump["landed"] else "falls" for arm in arms)
-    return f"With the momentum constraint (3d) the robot {with_}; without it, it {without}."
+    constraint = f"momentum constraint ({MOMENTUM_EQUATION[config.controller_name]})"
+    return f"With the {constraint} the robot {with_}; without it, it {without}."
