@@ -15,10 +15,11 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 
-from agents.vec_env import JumpVecEnv
 from icub_jump_env.errors import ICubJumpError, PolicyFileError
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy.files import load_tensors, save_tensors
+
+from .vec_env import JumpVecEnv
 
 _NAME = re.compile(r"checkpoint-(\d{6,})\.(safetensors|json)")
 _FINGERPRINT = "card"

@@ -9,15 +9,16 @@ from pathlib import Path
 
 from rich.console import Console
 
-from agents.options import OPTIONS, TrainOptions, read_options
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.cli import guarded, parse, seek
 from icub_jump_env.evaluation.episodes.workers import WorkerError
 from icub_jump_env.evaluation.report.output import say
 
+from .options import OPTIONS, TrainOptions, read_options
+
 _REMEDY = (
-    "training needs the extra 'rl': pip install \"icub-jump[rl]\" "
-    "(or stable-baselines3 and tensorboard)"
+    "training needs stable-baselines3 and tensorboard; in a checkout: "
+    'pip install -c constraints.txt -e ".[rl]"'
 )
 
 
@@ -29,7 +30,7 @@ def run(arguments: Sequence[str]) -> None:
 def _run(arguments: Sequence[str]) -> None:
     options = parse(TrainOptions, arguments, _default(arguments))
     try:
-        from agents.training import train
+        from .training import train
     except ImportError as error:
         raise MissingDependencyError(_REMEDY) from error
     console = Console(stderr=True)

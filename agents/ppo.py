@@ -7,10 +7,11 @@ import warnings
 import torch
 from stable_baselines3 import PPO
 
-from agents.environment import acting_steps
-from agents.options import TrainOptions
-from agents.vec_env import JumpVecEnv
 from icub_jump_env.policy import NetworkPolicy
+
+from .environment import acting_steps
+from .options import TrainOptions
+from .vec_env import JumpVecEnv
 
 
 def make_model(options: TrainOptions, env: JumpVecEnv) -> PPO:

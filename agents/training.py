@@ -27,19 +27,6 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch.utils.tensorboard import SummaryWriter
 
-from agents.checkpoints import (
-    Checkpoint,
-    begin_segment,
-    load_latest,
-    restore,
-    save_checkpoint,
-    segment_seeds,
-)
-from agents.environment import LaunchEnv, acting_steps
-from agents.options import COMMAND, OPTIONS, SELECTION, TrainOptions, read_options
-from agents.ppo import export, freeze_policy, make_model, set_noise
-from agents.run_folder import lock_run
-from agents.vec_env import JumpVecEnv
 from icub_jump_env.errors import ConfigError, PolicyFileError
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.quantities import CM, DEG, PERCENT, commands, number
@@ -48,6 +35,20 @@ from icub_jump_env.evaluation.report.provenance import SOURCE, command, source, 
 from icub_jump_env.evaluation.statistics.summary import Command, Summary, by_command, command_range
 from icub_jump_env.policy import load_policy, save_policy
 from icub_jump_env.policy.fields import check_command
+
+from .checkpoints import (
+    Checkpoint,
+    begin_segment,
+    load_latest,
+    restore,
+    save_checkpoint,
+    segment_seeds,
+)
+from .environment import LaunchEnv, acting_steps
+from .options import COMMAND, OPTIONS, SELECTION, TrainOptions, read_options
+from .ppo import export, freeze_policy, make_model, set_noise
+from .run_folder import lock_run
+from .vec_env import JumpVecEnv
 
 CURVE = "curve.json"
 """Its evaluations, the minutes each took with the steps before it, and its seeds."""

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
-from agents.environment import Env, EnvServer
 from icub_jump_env.errors import InvalidValueError
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.workers import end_workers, start_workers
 from icub_jump_env.policy import Policy
+
+from .environment import Env, EnvServer
 
 
 class JumpVecEnv(SubprocVecEnv):

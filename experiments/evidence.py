@@ -3,7 +3,7 @@
     python -m experiments.evidence
 
 trains whatever is not finished in runs/ (hours on two cores; an interrupted one goes on),
-fills experiments/runs/ and agents/pretrained/, draws the learning curves, and runs docs/update.py.
+fills experiments/runs/ and icub_jump_env/policy/shipped/, draws the learning curves, and runs docs/update.py.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from agents.training import BEST, CURVE, LAST, other_code
 from experiments.figures import learning_curves
 from experiments.rivals import best_constant, open_loop
 from experiments.seeds import TEST
-from experiments.shipped import CURVE_SUFFIX, PRETRAINED, REPOSITORY, RUNS
+from experiments.shipped import CURVE_SUFFIX, REPOSITORY, RUNS
 from icub_jump_env.checks import check_count
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.errors import ICubJumpError
@@ -36,7 +36,7 @@ from icub_jump_env.evaluation.report.output import say
 from icub_jump_env.evaluation.report.provenance import SOURCE, source, versions
 from icub_jump_env.evaluation.statistics.summary import Summary
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
-from icub_jump_env.policy.saving import LoadedPolicy
+from icub_jump_env.policy.saving import SHIPPED, LoadedPolicy
 
 EVIDENCE = Path("runs/evidence")
 """Where the runs are, in it."""
@@ -161,7 +161,7 @@ def _ship(controller: ControllerName, jobs: int, console: Console) -> LoadedPoli
         "landed": summary.landed.as_dict(),
         "mean_rise": summary.mean_rise,
     }
-    path = PRETRAINED / f"{controller}.safetensors"
+    path = SHIPPED / f"{controller}.safetensors"
     save_policy(
         path,
         best.policy.policy,
@@ -192,7 +192,7 @@ def _make_rivals(
     }
     for name, rival in rivals.items():
         save_policy(
-            PRETRAINED / f"{controller}-{name}.safetensors",
+            SHIPPED / f"{controller}-{name}.safetensors",
             rival,
             config=config,
             versions=versions() | {SOURCE: source()},

@@ -24,7 +24,7 @@ from rich.table import Table
 
 from experiments.figures import frontier_figure
 from experiments.seeds import TEST, TUNING
-from experiments.shipped import PRETRAINED, judged_config
+from experiments.shipped import judged_config
 from icub_jump_env.checks import check_count
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
@@ -43,6 +43,7 @@ from icub_jump_env.evaluation.report.output import (
 from icub_jump_env.evaluation.statistics.difference import Difference
 from icub_jump_env.evaluation.statistics.summary import Summary
 from icub_jump_env.metrics.jump import SuccessConfig
+from icub_jump_env.policy.saving import SHIPPED
 
 Episodes = Sequence[Episode]
 
@@ -102,7 +103,7 @@ def run_frontier(options: FrontierOptions) -> None:
     if options.plot is not None:
         check_writable("plot", options.plot, folder=True)
     names = (f"{options.controller}.safetensors", f"{options.controller}-constant.safetensors")
-    policy, constant = read_contenders([str(PRETRAINED / name) for name in names])
+    policy, constant = read_contenders([str(SHIPPED / name) for name in names])
     config = judged_config(policy)
     own = config.com_displacement
     assert own is not None  # the task has one

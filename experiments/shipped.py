@@ -10,9 +10,6 @@ from icub_jump_env.evaluation.episodes.contender import Contender, as_trained
 
 REPOSITORY = Path(__file__).parents[1]
 
-PRETRAINED = REPOSITORY / "agents" / "pretrained"
-"""Shipped policies."""
-
 RUNS = REPOSITORY / "experiments" / "runs"
 """The best policy of every training, and its learning curve."""
 

@@ -92,11 +92,21 @@ def save_policy(
     save_tensors(Path(path), policy.tensors(), card.as_dict())
 
 
+SHIPPED = Path(__file__).with_name("shipped")
+"""Folder of the policies that come with the package."""
+
+
+def shipped_policies() -> list[str]:
+    """Names of the policies that come with the package."""
+    return sorted(file.stem for file in SHIPPED.glob("*.safetensors"))
+
+
 def load_policy(path: str | os.PathLike[str], config: JumpConfig | None = None) -> LoadedPolicy:
     """Read a policy.
 
     Args:
-        path: The ``.safetensors`` file or its ``.json`` card.
+        path: Name of a shipped policy, such as ``torque``; else the ``.safetensors`` file
+            or its ``.json`` card.
         config: The environment it is for, if to be checked.
 
     Raises:
@@ -104,7 +114,10 @@ def load_policy(path: str | os.PathLike[str], config: JumpConfig | None = None) 
         PolicyMismatchError: If the policy was made for another environment.
         OSError: If the file system refuses.
     """
-    tensors, values = load_tensors(Path(path), MAX_POLICY_SIZE)
+    file = Path(path)
+    if str(path) in shipped_policies():
+        file = SHIPPED / f"{path}.safetensors"
+    tensors, values = load_tensors(file, MAX_POLICY_SIZE)
     try:
         card = PolicyCard.from_mapping(values)
         # Where nothing is said of the environment, the observation at least must be its.

@@ -12,6 +12,7 @@ from experiments import evidence, rivals
 from experiments.evidence import EvidenceError, EvidenceOptions, remake, trainings
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy
+from icub_jump_env.policy.saving import SHIPPED
 
 SHIPPED, RUNS = Path("shipped"), Path("shipped/runs")
 
@@ -27,7 +28,7 @@ def calls(monkeypatch):
             assert train(monkeypatch, *words[1:]) == 0
 
     monkeypatch.setattr(evidence, "_run", run)
-    for name, folder in {"REPOSITORY": Path(), "PRETRAINED": SHIPPED, "RUNS": RUNS}.items():
+    for name, folder in {"REPOSITORY": Path(), "SHIPPED": SHIPPED, "RUNS": RUNS}.items():
         monkeypatch.setattr(evidence, name, folder)
     monkeypatch.setattr(evidence, "HEADLINE_SEEDS", range(2))
     monkeypatch.setattr(evidence, "CONTROLLERS", ("velocity",))

@@ -52,7 +52,7 @@ def small(monkeypatch):
     monkeypatch.setattr(shipped, "TASK", task)
     for name, value in {
         "COMMANDS": (0.04, 0.06), "DISPLACEMENTS": (0.1,),
-        "TEST": range(3000, 3003), "_GRID_SEEDS": range(2), "PRETRAINED": Path("shipped"),
+        "TEST": range(3000, 3003), "_GRID_SEEDS": range(2), "SHIPPED": Path("shipped"),
     }.items():  # fmt: skip
         monkeypatch.setattr(frontier, name, value)
     monkeypatch.setattr(intervals, "_RESAMPLES", 200)
