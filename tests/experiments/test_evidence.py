@@ -12,7 +12,6 @@ from experiments import evidence, rivals
 from experiments.evidence import EvidenceError, EvidenceOptions, remake, trainings
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy
-from icub_jump_env.policy.saving import SHIPPED
 
 SHIPPED, RUNS = Path("shipped"), Path("shipped/runs")
 
