@@ -77,9 +77,12 @@ def record_video(
     # Complete or not at all: a full disk or an interrupt leaves an earlier video as it was.
     part = file.with_name(f".{file.stem}.part{file.suffix}")
     try:
-        iio.imwrite(part, frames, fps=max(1, round(config.agent_frequency / SLOW_MOTION)))
+        rate = max(1, round(config.agent_frequency / SLOW_MOTION))
         if part.suffix.lower() == ".mp4":
+            iio.imwrite(part, frames, fps=rate)
             _check_movie(part, file, len(frames))
+        else:
+            iio.imwrite(part, frames, fps=rate, loop=0)  # for ever
         part.replace(file)
     finally:
         part.unlink(missing_ok=True)
