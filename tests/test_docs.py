@@ -6,9 +6,9 @@ import shlex
 from pathlib import Path
 
 import pytest
+from icub_jump_env.control.contact import ContactLimits
 
 from icub_jump_env import observation
-from icub_jump_env.control.contact import ContactLimits
 from icub_jump_env.control.jump import FLIGHT_MOTION_TIME
 from icub_jump_env.control.phases import ContactThresholds
 from icub_jump_env.control.torque import TorqueGains

@@ -9,7 +9,9 @@ from conftest import jump
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.paper import PAPER as PAPERS
 from icub_jump_env.evaluation.rollout import make_env
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.robot import load_robot
+
+ROBOT = load_robot()
 
 PAPER = PAPERS["velocity"]
 
@@ -53,8 +55,8 @@ def test_within_the_limits(nominal):
     assert nominal.jump["limit_violations"] == 0.0
     torque = np.array([s.joint_torque for s in nominal.trace])
     speed = np.array([s.joint_velocity for s in nominal.trace])
-    assert (np.abs(torque) <= facts.EFFORT_LIMIT).all()
-    assert (np.abs(speed) <= 1.03 * facts.VELOCITY_LIMIT).all()
+    assert (np.abs(torque) <= ROBOT.effort_limit).all()
+    assert (np.abs(speed) <= 1.03 * ROBOT.velocity_limit).all()
 
 
 def test_no_solver_failure_and_hard_rows_held():

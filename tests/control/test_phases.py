@@ -6,10 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icub_jump_env.control.jump import landing_posture
-from icub_jump_env.control.minimum_jerk import MinimumJerk
 from icub_jump_env.control.phases import ContactThresholds, Phase, PhaseMachine
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.robot import facts
+from icub_jump_env.planning.minimum_jerk import MinimumJerk
+from icub_jump_env.robot.robot import load_robot
+
+ROBOT = load_robot()
 
 T = 0.43
 WEIGHT = 324.0
@@ -110,11 +112,11 @@ def test_minimum_jerk_has_the_least_jerk():
 
 @pytest.mark.parametrize("displacement", [0.11, 0.14])
 def test_landing_posture_of_a_long_launch(displacement):
-    np.testing.assert_allclose(landing_posture(facts.CROUCH, displacement), facts.LANDING)
+    np.testing.assert_allclose(landing_posture(ROBOT.crouch, displacement), ROBOT.landing)
 
 
 def test_a_shorter_launch_lands_deeper():
-    knee = facts.JOINT_INDEX["l_knee"]
-    knees = [landing_posture(facts.CROUCH, d)[knee] for d in (0.05, 0.08, 0.11)]
+    knee = ROBOT.joint_names.index("l_knee")
+    knees = [landing_posture(ROBOT.crouch, d)[knee] for d in (0.05, 0.08, 0.11)]
     assert knees == sorted(knees)
-    assert facts.CROUCH[knee] < knees[0]
+    assert ROBOT.crouch[knee] < knees[0]

@@ -8,25 +8,27 @@ import pytest
 from conftest import jump
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from icub_jump_env.control.contact import ContactLimits, contact_rows
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.control.contact import ContactLimits, contact_rows
-from icub_jump_env.control.qp import QPStatus, QuadraticProgram, check_solution
-from icub_jump_env.control.solvers import make_solver
+from icub_jump_env.control.qp.problem import QPStatus, QuadraticProgram, check_solution
+from icub_jump_env.control.qp.solvers import make_solver
 from icub_jump_env.control.torque import TorqueController, TorqueGains
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.evaluation.rollout import make_env
-from icub_jump_env.reference.com_reference import ComReference
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
-from icub_jump_env.robot import facts
+from icub_jump_env.planning.reference import ComReference
+from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
+from icub_jump_env.robot.robot import load_robot
 
-N = facts.N_JOINTS
-model = build_pinocchio_model()
+ROBOT = load_robot()
+
+N = ROBOT.n_joints
+model = build_pinocchio_model(ROBOT)
 LIMITS = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
-SOLE = facts.SOLE
+SOLE = ROBOT.sole
 
 
 class Case:
@@ -34,14 +36,14 @@ class Case:
 
     def __init__(self, seed, time=0.3, **options):
         rng = np.random.default_rng(seed)
-        s = facts.CROUCH.copy()
+        s = ROBOT.crouch.copy()
         stance = rng.normal(scale=0.02, size=3)
         s[[0, 3, 4]] += stance
         s[[6, 9, 10]] += stance
-        s[facts.TORSO] += rng.normal(scale=0.02, size=3)
-        s[facts.ARMS] += rng.normal(scale=0.02, size=8)
+        s[ROBOT.torso] += rng.normal(scale=0.02, size=3)
+        s[ROBOT.arms] += rng.normal(scale=0.02, size=8)
         s = np.clip(s, LIMITS[0] + 0.02, LIMITS[1] - 0.02)
-        kinematics = FeetFixedKinematics()
+        kinematics = FeetFixedKinematics(ROBOT)
         kinematics.update(s)
         # Joint velocities that leave both feet at rest.
         _, _, Vt = np.linalg.svd(kinematics.J_feet)
@@ -51,7 +53,7 @@ class Case:
         self.estimator.update(s, s_dot)
         self.holding = rng.normal(size=N)
         self.subject = TorqueController(
-            facts.CROUCH, self.holding, LIMITS, FeetFixedDynamics(kinematics), **options
+            ROBOT.crouch, self.holding, LIMITS, FeetFixedDynamics(kinematics), **options
         )
         self.reference = ComReference()
         trajectory = plan_com_trajectory(0.04)
@@ -73,7 +75,7 @@ def textbook(case, gains, contact, momentum_control):
     kinematics = case.estimator.kinematics
     quaternion = pin.Quaternion(kinematics.base_rotation).coeffs()
     q = np.concatenate((kinematics.base_position, quaternion, case.s))
-    soles = [model.getFrameId(frame) for frame in facts.SOLE_FRAMES]
+    soles = [model.getFrameId(frame) for frame in ROBOT.sole_frames]
     J = [pin.computeFrameJacobian(model, model.createData(), q, i) for i in soles]
     base = -np.linalg.solve(J[0][:, :6], J[0][:, 6:] @ case.s_dot)
     nu = np.concatenate((base, case.s_dot))
@@ -112,7 +114,7 @@ def textbook(case, gains, contact, momentum_control):
             A[:, N + 6 * foot + 3 : N + 6 * foot + 6] = R
         tasks.append((A, -gains.momentum * estimator.angular_momentum, gains.momentum_weight))
     posture = (
-        gains.posture_stiffness * (facts.CROUCH - case.s) - gains.posture_damping * case.s_dot
+        gains.posture_stiffness * (ROBOT.crouch - case.s) - gains.posture_damping * case.s_dot
     )
     H = np.zeros((N + 12, N + 12))
     g = np.zeros(N + 12)
@@ -129,7 +131,7 @@ def textbook(case, gains, contact, momentum_control):
     problem = QuadraticProgram(N + 12, n_inequalities=2 * len(cone), n_equalities=12)
     problem.H[:], problem.g[:] = H, g
     lower, upper = problem.lower, problem.upper
-    lower[:N], upper[:N] = -facts.EFFORT_LIMIT, facts.EFFORT_LIMIT
+    lower[:N], upper[:N] = -ROBOT.effort_limit, ROBOT.effort_limit
     lower[N:], upper[N : N + 12] = -1e6, 1e6
     for foot in range(2):
         wrench = slice(N + 6 * foot, N + 6 * foot + 6)
@@ -162,7 +164,7 @@ def test_constraints_hold_whatever_is_asked(seed, forward, upward):
     case = Case(seed)
     case.reference.acceleration[:] = [forward, 0.0, upward]
     torque = case.tick()
-    assert (np.abs(torque) <= facts.EFFORT_LIMIT).all()
+    assert (np.abs(torque) <= ROBOT.effort_limit).all()
     if not case.subject.report.failed:
         assert_contact_holds(case.subject.solution)
 
@@ -254,7 +256,7 @@ class TestNominalJump:
             if info["phase"] == "launch":
                 assert_contact_holds(launch.solution)
                 assert info["solver_primal_residual"] <= 1e-6
-                assert (np.abs(env.data.ctrl) <= facts.EFFORT_LIMIT).all()
+                assert (np.abs(env.data.ctrl) <= ROBOT.effort_limit).all()
                 ticks += 1
         assert ticks > 200
         assert info["jump"]["solver_failures"] == 0.0

@@ -9,15 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from icub_jump_env.control.qp import QPSolution, QPStatus
+from icub_jump_env.control.qp.problem import QPSolution, QPStatus
 from icub_jump_env.control.velocity import VelocityController, VelocityGains
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
-from icub_jump_env.robot import facts
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
+from icub_jump_env.robot.robot import load_robot
+
+ROBOT = load_robot()
 
 DT = 0.005
-model = build_pinocchio_model()
+model = build_pinocchio_model(ROBOT)
 LIMITS = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
 com_velocities = st.tuples(
     st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(0.0, 0.3)
@@ -26,7 +28,7 @@ seeds = st.integers(0, 1000)
 
 
 def controller(**options):
-    return VelocityController(facts.CROUCH, LIMITS, DT, **options)
+    return VelocityController(ROBOT.crouch, LIMITS, DT, **options)
 
 
 def tick(subject, estimator, s, com_position, com_velocity):
@@ -38,15 +40,15 @@ def tick(subject, estimator, s, com_position, com_velocity):
 def measured(seed, spread=0.02):
     """An estimator at a random posture that keeps both feet on the floor, and the readings."""
     rng = np.random.default_rng(seed)
-    s = facts.CROUCH + 0.0
+    s = ROBOT.crouch + 0.0
     stance = rng.normal(scale=spread, size=6)
-    s[facts.LEFT_LEG] += stance * [1, 0, 0, 1, 1, 0]
-    s[facts.RIGHT_LEG] += stance * [1, 0, 0, 1, 1, 0]
-    s[facts.TORSO] += rng.normal(scale=spread, size=3)
-    s[facts.ARMS] += rng.normal(scale=spread, size=8)
+    s[ROBOT.left_leg] += stance * [1, 0, 0, 1, 1, 0]
+    s[ROBOT.right_leg] += stance * [1, 0, 0, 1, 1, 0]
+    s[ROBOT.torso] += rng.normal(scale=spread, size=3)
+    s[ROBOT.arms] += rng.normal(scale=spread, size=8)
     s = np.clip(s, LIMITS[0] + 0.05, LIMITS[1] - 0.05)
-    s_dot = 0.1 * rng.normal(size=facts.N_JOINTS)
-    estimator = FeetFixedEstimator(FeetFixedKinematics())
+    s_dot = 0.1 * rng.normal(size=ROBOT.n_joints)
+    estimator = FeetFixedEstimator(FeetFixedKinematics(ROBOT))
     estimator.update(s, s_dot)
     return estimator, s
 
@@ -64,7 +66,7 @@ def textbook(
     q = np.concatenate((kinematics.base_position, quaternion, s))
     data = model.createData()
     feet = np.vstack(
-        [pin.computeFrameJacobian(model, data, q, model.getFrameId(f)) for f in facts.SOLE_FRAMES]
+        [pin.computeFrameJacobian(model, data, q, model.getFrameId(f)) for f in ROBOT.sole_frames]
     )
     pin.computeCentroidalMap(model, data, q)
     rows = [data.Ag[:3] / kinematics.mass]
@@ -78,7 +80,7 @@ def textbook(
     H = np.zeros((29, 29))
     H[6:, 6:] = np.diag(Lambda + Delta)
     g = np.zeros(29)
-    g[6:] = -(Lambda * -gains.posture * (s - facts.CROUCH) + Delta * previous)
+    g[6:] = -(Lambda * -gains.posture * (s - ROBOT.crouch) + Delta * previous)
     for row, target, weight in zip(rows, targets, weights, strict=True):
         H += weight * row.T @ row
         g -= weight * row.T @ target
@@ -98,9 +100,9 @@ def test_equals_the_textbook_form_where_no_limit_is_active(seed, com_velocity, m
     command = tick(subject, estimator, s, estimator.com, com_velocity)
     integral = estimator.angular_momentum * DT
     nu, _ = textbook(
-        estimator, s, com_velocity, np.zeros(facts.N_JOINTS), integral, gains, momentum_control
+        estimator, s, com_velocity, np.zeros(ROBOT.n_joints), integral, gains, momentum_control
     )
-    assert (np.abs(nu[6:]) < 0.9 * facts.VELOCITY_LIMIT).all()
+    assert (np.abs(nu[6:]) < 0.9 * ROBOT.velocity_limit).all()
     np.testing.assert_allclose(command, nu[6:], atol=1e-7)
 
 
@@ -143,7 +145,7 @@ def test_limits_hold_whatever_is_asked(seed, forward, upward, solver):
     estimator, s = measured(seed)
     subject = controller(solver=solver)
     command = tick(subject, estimator, s, estimator.com, np.array([forward, 0.0, upward]))
-    assert (np.abs(command) <= VelocityGains().velocity_margin * facts.VELOCITY_LIMIT).all()
+    assert (np.abs(command) <= VelocityGains().velocity_margin * ROBOT.velocity_limit).all()
     horizon = VelocityGains().limit_horizon
     assert horizon >= DT
     assert (s + command * horizon >= LIMITS[0] - 1e-12).all()
@@ -186,7 +188,7 @@ def test_smoothness_pulls_towards_the_previous_command():
     estimator, s = measured(0)
     steps = []
     for weight in (0.1, 10.0):
-        gains = dataclasses.replace(VelocityGains(), smoothness_weight=(weight,) * facts.N_JOINTS)
+        gains = dataclasses.replace(VelocityGains(), smoothness_weight=(weight,) * ROBOT.n_joints)
         subject = controller(gains=gains)
         commands = [
             tick(subject, estimator, s, estimator.com, np.array([0.0, 0.0, speed]))
@@ -198,11 +200,11 @@ def test_smoothness_pulls_towards_the_previous_command():
 
 def test_per_joint_weights_favour_joints():
     estimator, s = measured(0)
-    knee = facts.JOINT_INDEX["l_knee"]
+    knee = ROBOT.joint_names.index("l_knee")
     uses = []
     for weight in (1.0, 100.0):
-        weights = np.ones(facts.N_JOINTS)
-        weights[[knee, facts.JOINT_INDEX["r_knee"]]] = weight
+        weights = np.ones(ROBOT.n_joints)
+        weights[[knee, ROBOT.joint_names.index("r_knee")]] = weight
         gains = dataclasses.replace(VelocityGains(), posture_weight=tuple(weights))
         command = tick(
             controller(gains=gains), estimator, s, estimator.com, np.array([0.0, 0.0, 0.2])
@@ -281,16 +283,16 @@ def test_feet_and_limits_that_contradict_each_other_are_a_counted_failure():
     with both feet at rest."""
     estimator, s = measured(0)
     s = s.copy()
-    s[facts.LEFT_LEG] = LIMITS[0][facts.LEFT_LEG] - 0.02
-    s[facts.RIGHT_LEG] = LIMITS[1][facts.RIGHT_LEG] + 0.02
-    estimator.update(s, np.zeros(facts.N_JOINTS))
+    s[ROBOT.left_leg] = LIMITS[0][ROBOT.left_leg] - 0.02
+    s[ROBOT.right_leg] = LIMITS[1][ROBOT.right_leg] + 0.02
+    estimator.update(s, np.zeros(ROBOT.n_joints))
     subject = controller()
     command = tick(subject, estimator, s, estimator.com, np.zeros(3))
     assert subject.report.status is QPStatus.INFEASIBLE
     # The limits still hold: every joint is on its way back into its range.
     horizon = VelocityGains().limit_horizon
-    assert (command[facts.LEFT_LEG] >= 0.02 / horizon - 1e-9).all()
-    assert (command[facts.RIGHT_LEG] <= -0.02 / horizon + 1e-9).all()
+    assert (command[ROBOT.left_leg] >= 0.02 / horizon - 1e-9).all()
+    assert (command[ROBOT.right_leg] <= -0.02 / horizon + 1e-9).all()
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icub_jump_env.errors import CommandNotScalableError
-from icub_jump_env.reference.com_trajectory import (
+from icub_jump_env.planning.scaled_curve import (
     ACCELERATION_CURVE,
     DISPLACEMENT_CURVE,
     plan_com_trajectory,
     takeoff_velocity,
 )
-from icub_jump_env.robot.facts import GRAVITY
+from icub_jump_env.robot.icub import GRAVITY
 
 CURVES = [DISPLACEMENT_CURVE, ACCELERATION_CURVE]
 

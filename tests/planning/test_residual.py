@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from icub_jump_env.reference.com_reference import ComReference
-from icub_jump_env.reference.com_trajectory import plan_com_trajectory
-from icub_jump_env.reference.residual import ResidualFilter
+from icub_jump_env.planning.reference import ComReference
+from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 
 targets = st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3).map(np.array)
 
