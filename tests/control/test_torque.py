@@ -39,6 +39,13 @@ class Case:
         self.wanted.com_acceleration[:] = planned.com_acceleration
         self.wanted.com_position += 0.002 * standing.rng.normal(size=3)
 
+    def ask_for_what_can_be_had(self):
+        """Every part of the set point is asked for, none far from what the robot does."""
+        self.standing.ask(size=0.1)
+        state, noise = self.standing.state, self.standing.rng.normal
+        self.wanted.com_velocity[:] = state.com_velocity + 0.01 * noise(size=3)
+        self.wanted.angular_momentum[:] = state.angular_momentum + 0.1 * noise(size=3)
+
     def tick(self):
         return self.subject.command(self.standing.state, self.wanted).torque
 
@@ -126,11 +133,9 @@ def textbook(case, previous):
 
 
 @settings(max_examples=15)
-@given(
-    st.integers(0, 1000), st.booleans(), st.floats(0.0, 0.42), st.sampled_from(["soft", "hard"])
-)
-def test_equals_the_textbook_form(seed, momentum_control, time, constraints):
-    case = Case(seed, time, momentum_control=momentum_control, constraints=constraints)
+@given(st.integers(0, 1000), st.booleans(), st.floats(0.0, 0.42))
+def test_equals_the_textbook_form(seed, momentum_control, time):
+    case = Case(seed, time, momentum_control=momentum_control)
     torque = case.tick()
     assert case.subject.report.status is QPStatus.SOLVED
     np.testing.assert_allclose(torque, textbook(case, case.holding), atol=1e-5)
@@ -156,7 +161,7 @@ def test_equals_the_textbook_form_at_any_weights_gains_and_set_points(seed, cons
         momentum=draw(1.0, 15.0),
         contact=ContactConfig(friction=draw(0.4, 0.8), minimum_force=draw(5.0, 30.0)),
     )
-    case.standing.ask(size=0.3)
+    case.ask_for_what_can_be_had()
     previous = case.holding
     for _ in range(2):
         torque = case.tick()
@@ -264,11 +269,11 @@ def test_bad_gains_are_refused(field, value):
 class TestHardConstraints:
     """Eq. 6 as printed."""
 
-    @given(st.integers(0, 1000), st.floats(0.0, 0.4))
+    @given(st.integers(0, 1000))
     @settings(max_examples=15)
-    def test_com_and_momentum_hold_where_they_can(self, seed, time):
-        case = Case(seed, time, constraints="hard")
-        case.standing.ask(size=0.3)
+    def test_com_and_momentum_hold_where_they_can(self, seed):
+        case = Case(seed, constraints="hard")
+        case.ask_for_what_can_be_had()
         case.tick()
         assert case.subject.report.status is QPStatus.SOLVED
         oracle, config, wanted = Oracle(case.standing), case.config, case.wanted
@@ -295,7 +300,7 @@ class TestHardConstraints:
         np.testing.assert_array_equal(*answers)
         np.testing.assert_array_equal(hard.subject.solution, soft.subject.solution)
         assert np.abs(answers[0] - hard.holding).max() > 1.0
-        hard.wanted.com_acceleration[:] = 0.0
+        hard.ask_for_what_can_be_had()
         hard.tick()
         assert not hard.subject.report.failed
 
