@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import icub_jump_env
 from icub_jump_env import observation
-from icub_jump_env.control.qp import QPStatus
+from icub_jump_env.control.qp.problem import QPStatus
 
 
 @pytest.mark.parametrize("name", ["ICubJump-v0", "icub_jump_env:ICubJump-v0"])

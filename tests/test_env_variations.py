@@ -12,12 +12,14 @@ from gymnasium.utils.env_checker import check_env
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.evaluation.episodes.rollout import make_env
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.actuators.config import ACTUATORS, FRICTION, ActuatorConfig
 from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
 from icub_jump_env.simulation.randomization import Randomization
 from icub_jump_env.simulation.sensor_models import SENSORS, SensorConfig, SensorError
 from icub_jump_env.simulation.simulation import PUSH_DURATION
+
+ROBOT = load_robot()
 
 
 def test_checker_passes_with_everything_on():
@@ -149,8 +151,8 @@ class TestEffects:
         for _ in range(44):
             env.step(ZERO)
             most = np.maximum(most, np.abs(env.data.ctrl))
-        assert (most <= 0.8 * facts.EFFORT_LIMIT + 1e-9).all()
-        assert most[facts.JOINT_INDEX["l_knee"]] == pytest.approx(0.8 * 37.0)
+        assert (most <= 0.8 * ROBOT.effort_limit + 1e-9).all()
+        assert most[ROBOT.joint_names.index("l_knee")] == pytest.approx(0.8 * 37.0)
 
     def test_encoder_bias_moves_the_crouch_the_other_way(self):
         """The servos hold what the encoders show, so the joints are off by the bias."""
@@ -197,7 +199,7 @@ class TestEffects:
 
     def test_force_sensor_errors_reach_the_torque_loop(self):
         biased = SensorConfig(force=SensorError(bias=20.0))
-        knee = facts.JOINT_INDEX["l_knee"]
+        knee = ROBOT.joint_names.index("l_knee")
         torques = []
         for sensors in (SensorConfig(), biased):
             env = make_env(
@@ -225,10 +227,10 @@ class TestEffects:
         env.reset(seed=0)
         simulation, data = env._simulation, env.data
         data.qvel[6:] = 3.0
-        simulation.command(JointCommand(-facts.VELOCITY_LIMIT))
+        simulation.command(JointCommand(-ROBOT.velocity_limit))
         simulation.step()
-        friction = FRICTION * facts.EFFORT_LIMIT
-        np.testing.assert_allclose(data.qfrc_actuator[6:], -facts.EFFORT_LIMIT, atol=1e-9)
+        friction = FRICTION * ROBOT.effort_limit
+        np.testing.assert_allclose(data.qfrc_actuator[6:], -ROBOT.effort_limit, atol=1e-9)
         np.testing.assert_allclose(data.qfrc_applied[6:], -friction, rtol=1e-6)
 
     def test_slope_shows_in_the_imu(self):

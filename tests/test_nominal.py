@@ -7,16 +7,18 @@ import pytest
 from conftest import jump
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.paper import PAPER as PAPERS
 from icub_jump_env.evaluation.episodes.rollout import make_env
-from icub_jump_env.evaluation.statistics.paper import PAPER as PAPERS
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.robot import load_robot
+
+ROBOT = load_robot()
 
 PAPER = PAPERS["velocity"]
 
 
 def test_jumps_at_least_as_high_as_the_paper(nominal):
-    assert nominal.jump["flight_height"] >= PAPER["flight_height"]
-    assert nominal.jump["sole_height"] >= PAPER["sole_height"]
+    assert nominal.jump["flight_height"] >= PAPER.flight_height
+    assert nominal.jump["sole_height"] >= PAPER.sole_height
     assert nominal.jump["flight_height"] >= 0.039
 
 
@@ -27,8 +29,8 @@ def test_lands_and_stands(nominal):
 
 
 def test_takes_off_when_and_as_fast_as_the_paper(nominal):
-    assert nominal.jump["takeoff_time"] == pytest.approx(PAPER["takeoff_time"], abs=0.01)
-    assert nominal.jump["takeoff_velocity"] == pytest.approx(PAPER["takeoff_velocity"], abs=0.02)
+    assert nominal.jump["takeoff_time"] == pytest.approx(PAPER.takeoff_time, abs=0.01)
+    assert nominal.jump["takeoff_velocity"] == pytest.approx(PAPER.takeoff_velocity, abs=0.02)
 
 
 def test_momentum_constraint_prevents_the_rotation(nominal, ablated):
@@ -53,8 +55,8 @@ def test_within_the_limits(nominal):
     assert nominal.jump["limit_violations"] == 0.0
     torque = np.array([s.joint_torque for s in nominal.trace])
     speed = np.array([s.joint_velocity for s in nominal.trace])
-    assert (np.abs(torque) <= facts.EFFORT_LIMIT).all()
-    assert (np.abs(speed) <= 1.03 * facts.VELOCITY_LIMIT).all()
+    assert (np.abs(torque) <= ROBOT.effort_limit).all()
+    assert (np.abs(speed) <= 1.03 * ROBOT.velocity_limit).all()
 
 
 def test_no_solver_failure_and_hard_rows_held():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from icub_jump_env.control.solvers import SOLVERS, make_solver
 
-from icub_jump_env.control.qp import QPSolution, QPStatus, QuadraticProgram, check_solution
+from icub_jump_env.control.qp.problem import QPSolution, QPStatus, QuadraticProgram, check_solution
+from icub_jump_env.control.qp.solvers import SOLVERS, make_solver
 
 seeds = st.integers(0, 10_000)
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from icub_jump_env.robot.facts import GRAVITY
 
 from icub_jump_env.metrics.jump import JointLimits, JumpMetrics, JumpRecorder
 from icub_jump_env.metrics.state import TrueState
+from icub_jump_env.robot.icub import GRAVITY
 
 DT = 1e-3
 WEIGHT = 324.0

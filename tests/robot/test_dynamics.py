@@ -6,11 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from icub_jump_env.robot import facts
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
+from icub_jump_env.robot.robot import load_robot
 
-model = build_pinocchio_model()
+ROBOT = load_robot()
+
+model = build_pinocchio_model(ROBOT)
 damping = np.array(model.damping[6:])
 
 
@@ -19,10 +21,10 @@ class Random:
 
     def __init__(self, seed):
         rng = np.random.default_rng(seed)
-        n = facts.N_JOINTS
-        self.s = facts.CROUCH + 0.1 * rng.normal(size=n)
+        n = ROBOT.n_joints
+        self.s = ROBOT.crouch + 0.1 * rng.normal(size=n)
         self.s_dot = rng.normal(size=n)
-        self.kinematics = FeetFixedKinematics()
+        self.kinematics = FeetFixedKinematics(ROBOT)
         self.dynamics = FeetFixedDynamics(self.kinematics)
         self.kinematics.update(self.s)
         self.dynamics.update(self.s, self.s_dot)
@@ -31,7 +33,7 @@ class Random:
 
         quaternion = pin.Quaternion(self.kinematics.base_rotation).coeffs()
         self.q = np.concatenate((self.kinematics.base_position, quaternion, self.s))
-        self.soles = [model.getFrameId(frame) for frame in facts.SOLE_FRAMES]
+        self.soles = [model.getFrameId(frame) for frame in ROBOT.sole_frames]
         self.J = [
             pin.computeFrameJacobian(model, model.createData(), self.q, i) for i in self.soles
         ]
@@ -91,7 +93,7 @@ def test_force_and_moment_rows_sum_the_contacts(seed):
 def test_momentum_balance(rng):
     """Newton and Euler: with the feet at rest, the contact forces change the momentum."""
     state = Random(3)
-    ours, n = state.dynamics, facts.N_JOINTS
+    ours, n = state.dynamics, ROBOT.n_joints
     # Wrenches that satisfy the base rows for the given joint accelerations.
     rows, bias = ours.base_rows, ours.base_bias
     f, *_ = np.linalg.lstsq(rows[:, n:], bias - rows[:, :n] @ state.s_ddot, rcond=None)
@@ -105,4 +107,4 @@ def test_momentum_balance(rng):
 
 def test_shared_model_keeps_its_gravity():
     Random(0)
-    assert build_pinocchio_model().gravity.linear == pytest.approx([0, 0, -9.81])
+    assert build_pinocchio_model(ROBOT).gravity.linear == pytest.approx([0, 0, -9.81])

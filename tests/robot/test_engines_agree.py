@@ -1,14 +1,17 @@
 """MuJoCo against Pinocchio on random states: two independent implementations."""
 
+import functools
+
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from icub_jump_env.robot import facts
+from icub_jump_env.robot import icub
 from icub_jump_env.robot.frames import mujoco_qpos, mujoco_qvel, pinocchio_q, pinocchio_v
 from icub_jump_env.robot.kinematics import build_pinocchio_model
 from icub_jump_env.robot.mujoco_model import build_model
+from icub_jump_env.robot.robot import load_robot
 
 RELATIVE = 1e-9
 
@@ -18,12 +21,16 @@ def close(actual, expected):
     assert np.abs(actual - expected).max() <= RELATIVE * scale
 
 
+ROBOTS = "iCubGenova04", "iCubGenova02", "iCubGenova01"
+compiled = functools.cache(build_model)
+
+
 class Both:
     """One random state in both engines."""
 
-    def __init__(self, seed):
-        rng = np.random.default_rng(seed)
-        self.pin_model = build_pinocchio_model()
+    def __init__(self, name, seed):
+        rng, robot = np.random.default_rng(seed), load_robot(name)
+        self.pin_model = build_pinocchio_model(robot)
         self.pin_data = self.pin_model.createData()
         quaternion = rng.normal(size=4)
         lower, upper = self.pin_model.lowerPositionLimit[7:], self.pin_model.upperPositionLimit[7:]
@@ -35,7 +42,7 @@ class Both:
             )
         )
         self.v = rng.normal(size=self.pin_model.nv)
-        self.model = build_model(0.001)
+        self.model = compiled(robot, 0.001)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:] = mujoco_qpos(self.q)
         self.data.qvel[:] = mujoco_qvel(self.q, self.v)
@@ -45,9 +52,9 @@ class Both:
         self.X[:3, :3] = pin.Quaternion(self.q[3:7]).matrix()
 
 
-@pytest.fixture(params=range(10))
+@pytest.fixture(params=[(name, seed) for name in ROBOTS for seed in range(10)], ids=str)
 def both(request):
-    return Both(request.param)
+    return Both(*request.param)
 
 
 def test_mass_matrix(both):
@@ -78,7 +85,7 @@ def test_com_jacobian(both):
     close(J @ both.X, pin.jacobianCenterOfMass(both.pin_model, both.pin_data, both.q))
 
 
-@pytest.mark.parametrize("link", [*facts.SOLE_FRAMES, facts.CHEST_LINK, "head", "l_hand"])
+@pytest.mark.parametrize("link", [*icub.SOLE_FRAMES, icub.CHEST_LINK, "head", "l_hand"])
 def test_link_jacobian(both, link):
     J = np.zeros((6, both.model.nv))
     mujoco.mj_jacBody(both.model, both.data, J[:3], J[3:], both.model.body(link).id)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.actuators.actuators import Actuators
 from icub_jump_env.simulation.actuators.config import ACTUATORS, FRICTION, ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor, RatedMotor
@@ -20,8 +20,10 @@ from icub_jump_env.simulation.actuators.torque_loops import (
     TorqueFeedback,
 )
 
+ROBOT = load_robot()
+
 DT = 0.001
-N = facts.N_JOINTS
+N = ROBOT.n_joints
 zeros, ones = np.zeros(N), np.ones(N)
 vectors = st.integers(0, 10_000).map(lambda seed: np.random.default_rng(seed).normal(size=N))
 
@@ -47,24 +49,24 @@ class TestLimits:
             made.command(wanted)
             for _ in range(5):
                 torque = made.torque(size * position, size * velocity)
-                assert (np.abs(torque) <= facts.EFFORT_LIMIT).all()
+                assert (np.abs(torque) <= ROBOT.effort_limit).all()
 
     @given(st.floats(0.0, 1.0))
     def test_no_torque_drives_a_joint_beyond_its_top_speed(self, share):
         """At 1.03 x the speed limit the torque in the direction of motion is gone."""
         made = actuators()
-        made.command(JointCommand(10 * facts.VELOCITY_LIMIT))
-        speed = facts.VELOCITY_LIMIT * (1.0 + 0.03 * share)
+        made.command(JointCommand(10 * ROBOT.velocity_limit))
+        speed = ROBOT.velocity_limit * (1.0 + 0.03 * share)
         torque = made.torque(zeros, speed)
-        np.testing.assert_allclose(torque, facts.EFFORT_LIMIT * (1 - share), atol=1e-9)
-        assert (made.torque(zeros, 1.05 * facts.VELOCITY_LIMIT) < 0).all()
+        np.testing.assert_allclose(torque, ROBOT.effort_limit * (1 - share), atol=1e-9)
+        assert (made.torque(zeros, 1.05 * ROBOT.velocity_limit) < 0).all()
 
     def test_weak_motors_give_their_share(self, rng):
         strength = rng.uniform(0.5, 1.0, N)
         made = Actuators(ActuatorConfig(), DT, strength=strength)
         made.reset(zeros, zeros)
         made.command(JointCommand(torque=1e3 * ones))
-        np.testing.assert_allclose(made.torque(zeros, zeros), strength * facts.EFFORT_LIMIT)
+        np.testing.assert_allclose(made.torque(zeros, zeros), strength * ROBOT.effort_limit)
 
     def test_dc_motor_follows_current_and_voltage(self):
         motor = DCMotor(current_limit=0.7, voltage_limit=0.9, stall_torque=3.0, no_load_speed=1.2)
@@ -75,9 +77,9 @@ class TestLimits:
             share = max(-0.7, min(0.7, line))
             for direction in (1.0, -1.0):
                 made.command(JointCommand(torque=direction * 1e3 * ones))
-                torque = made.torque(zeros, direction * speed * facts.VELOCITY_LIMIT)
+                torque = made.torque(zeros, direction * speed * ROBOT.velocity_limit)
                 np.testing.assert_allclose(
-                    torque, direction * share * facts.EFFORT_LIMIT, atol=1e-9
+                    torque, direction * share * ROBOT.effort_limit, atol=1e-9
                 )
 
     @pytest.mark.parametrize("motor", [RatedMotor(), DCMotor()])
@@ -89,9 +91,9 @@ class TestLimits:
             for made in (weak, strong):
                 made.reset(zeros, zeros)
                 made.command(JointCommand(torque=1e3 * ones))
-            expected = strength * strong.torque(zeros, speed * facts.VELOCITY_LIMIT)
+            expected = strength * strong.torque(zeros, speed * ROBOT.velocity_limit)
             np.testing.assert_allclose(
-                weak.torque(zeros, speed * facts.VELOCITY_LIMIT), expected, atol=1e-9
+                weak.torque(zeros, speed * ROBOT.velocity_limit), expected, atol=1e-9
             )
 
     def test_raised_limits_are_the_default(self):
@@ -99,21 +101,21 @@ class TestLimits:
         made = actuators(motor=DCMotor())
         made.command(JointCommand(torque=1e3 * ones))
         for speed, share in ((0.93, 1.0), (0.9375, 1.0), (1.0, 0.8), (1.25, 0.0)):
-            torque = made.torque(zeros, speed * facts.VELOCITY_LIMIT)
-            np.testing.assert_allclose(torque, share * facts.EFFORT_LIMIT, atol=1e-9)
+            torque = made.torque(zeros, speed * ROBOT.velocity_limit)
+            np.testing.assert_allclose(torque, share * ROBOT.effort_limit, atol=1e-9)
 
 
 class TestServo:
     def test_reset_holds_with_the_given_torque(self, rng):
-        torque = 0.5 * facts.EFFORT_LIMIT * rng.uniform(-1, 1, N)
-        made = actuators(facts.CROUCH, torque)
-        np.testing.assert_allclose(made.torque(facts.CROUCH, zeros), torque, atol=1e-9)
+        torque = 0.5 * ROBOT.effort_limit * rng.uniform(-1, 1, N)
+        made = actuators(ROBOT.crouch, torque)
+        np.testing.assert_allclose(made.torque(ROBOT.crouch, zeros), torque, atol=1e-9)
 
     @pytest.mark.parametrize("name", ["ideal", "realistic"])
     def test_velocity_command_is_tracked_without_offset(self, rng, name):
         """A joint of known inertia under a constant load reaches the commanded velocity."""
-        inertia, load = facts.ARMATURE + 0.05, 0.3 * facts.EFFORT_LIMIT
-        goal = 0.3 * facts.VELOCITY_LIMIT * np.sign(rng.normal(size=N))
+        inertia, load = ROBOT.armature + 0.05, 0.3 * ROBOT.effort_limit
+        goal = 0.3 * ROBOT.velocity_limit * np.sign(rng.normal(size=N))
         made = Actuators(ACTUATORS[name], DT)
         made.reset(zeros, zeros)
         made.command(JointCommand(goal))
@@ -142,21 +144,21 @@ class TestServo:
     def test_does_not_wind_up(self):
         """After a long time against a stop, a small command backward acts at once."""
         made = actuators()
-        made.command(JointCommand(facts.VELOCITY_LIMIT))
+        made.command(JointCommand(ROBOT.velocity_limit))
         for _ in range(3000):
             torque = made.torque(zeros, zeros)
-        np.testing.assert_allclose(torque, facts.EFFORT_LIMIT)
-        backward = 0.01 * facts.VELOCITY_LIMIT
+        np.testing.assert_allclose(torque, ROBOT.effort_limit)
+        backward = 0.01 * ROBOT.velocity_limit
         made.command(JointCommand(-backward))
         # What the stop left behind is the error that the effort limit can use, no more.
-        worst = (facts.EFFORT_LIMIT / ServoGains().stiffness / backward).max()
+        worst = (ROBOT.effort_limit / ServoGains().stiffness / backward).max()
         for _ in range(math.ceil(worst / DT)):
             torque = made.torque(zeros, zeros)
         assert (torque < 0).all()
 
     def test_reset_forgets_the_command(self):
         made = actuators()
-        made.command(JointCommand(facts.VELOCITY_LIMIT))
+        made.command(JointCommand(ROBOT.velocity_limit))
         made.reset(zeros, zeros)
         assert not made.velocity_command.any()
         assert not made.torque(zeros, zeros).any()
@@ -182,7 +184,7 @@ class TestTorqueLoops:
 
     def test_feedback_rejects_friction_and_current_control_does_not(self):
         turning = 2.0 * ones
-        friction = 0.05 * facts.EFFORT_LIMIT[0]
+        friction = 0.05 * ROBOT.effort_limit[0]
         feedback = self.step_response(TorqueFeedback(20.0), 400, 5.0, turning, friction=0.05)[-1]
         current = self.step_response(
             CurrentControl(200.0, 0.6, 1.0), 400, 5.0, turning, friction=0.05
@@ -242,16 +244,16 @@ class TestTorqueLoops:
         made.command(JointCommand(torque=zeros))
         for _ in range(50):
             torque = made.torque(zeros, zeros)
-        assert (np.abs(torque) < 0.01 * facts.EFFORT_LIMIT).all()
+        assert (np.abs(torque) < 0.01 * ROBOT.effort_limit).all()
 
     @pytest.mark.parametrize("loop", [TorqueFeedback(), CurrentControl()])
     def test_torque_control_starts_where_the_servo_left_off(self, rng, loop):
-        holding = 0.5 * facts.EFFORT_LIMIT * rng.uniform(-1, 1, N)
-        made = actuators(facts.CROUCH, holding, torque_loop=loop)
-        made.torque(facts.CROUCH, zeros)
+        holding = 0.5 * ROBOT.effort_limit * rng.uniform(-1, 1, N)
+        made = actuators(ROBOT.crouch, holding, torque_loop=loop)
+        made.torque(ROBOT.crouch, zeros)
         made.command(JointCommand(torque=holding))
         np.testing.assert_allclose(
-            made.torque(facts.CROUCH, zeros), holding, atol=0.03 * facts.EFFORT_LIMIT.max()
+            made.torque(ROBOT.crouch, zeros), holding, atol=0.03 * ROBOT.effort_limit.max()
         )
 
 
@@ -262,15 +264,15 @@ class TestFriction:
         made.command(JointCommand(torque=zeros))
         torque = joint_torque(made, zeros, velocity)
         assert (torque * velocity <= 0).all()
-        assert (np.abs(torque) <= 0.1 * facts.EFFORT_LIMIT + 1e-12).all()
+        assert (np.abs(torque) <= 0.1 * ROBOT.effort_limit + 1e-12).all()
         fast = np.abs(velocity) > 0.3
         np.testing.assert_allclose(
-            torque[fast], -0.1 * (np.sign(velocity) * facts.EFFORT_LIMIT)[fast], rtol=1e-4
+            torque[fast], -0.1 * (np.sign(velocity) * ROBOT.effort_limit)[fast], rtol=1e-4
         )
 
     def test_share_at_the_knee_as_documented(self):
-        knee = facts.JOINT_INDEX["l_knee"]
-        assert FRICTION * facts.EFFORT_LIMIT[knee] == pytest.approx(2.2, abs=0.05)
+        knee = ROBOT.joint_names.index("l_knee")
+        assert FRICTION * ROBOT.effort_limit[knee] == pytest.approx(2.2, abs=0.05)
 
 
 @pytest.mark.parametrize(

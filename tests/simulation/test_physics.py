@@ -5,21 +5,23 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from icub_jump_env.robot import facts
 from icub_jump_env.robot.frames import pinocchio_q, pinocchio_v
 from icub_jump_env.robot.kinematics import build_pinocchio_model
+from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.ground_truth import GroundTruth
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.sensor_models import SensorConfig
 from icub_jump_env.simulation.sensors import Sensors
 
-zeros = np.zeros(facts.N_JOINTS)
+ROBOT = load_robot()
+
+zeros = np.zeros(ROBOT.n_joints)
 
 
 def thrown(physics, seed=0, height=1.5):
     """Put the robot into the air, turning and moving its joints."""
     rng = np.random.default_rng(seed)
-    qpos = np.concatenate(([0, 0, height], rng.normal(size=4), facts.CROUCH))
+    qpos = np.concatenate(([0, 0, height], rng.normal(size=4), ROBOT.crouch))
     qpos[3:7] /= np.linalg.norm(qpos[3:7])
     physics.reset(qpos)
     physics.data.qvel[:] = 0.5 * rng.normal(size=physics.model.nv)
@@ -27,7 +29,7 @@ def thrown(physics, seed=0, height=1.5):
 
 @pytest.fixture
 def physics():
-    return Physics(0.001)
+    return Physics(ROBOT, 0.001)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -38,7 +40,7 @@ def test_ground_truth_against_pinocchio(physics, seed):
     physics.step(zeros)
     state = truth.read()
 
-    model = build_pinocchio_model()
+    model = build_pinocchio_model(ROBOT)
     data = model.createData()
     q = pinocchio_q(qpos)
     v = pinocchio_v(q, qvel)
@@ -50,15 +52,15 @@ def test_ground_truth_against_pinocchio(physics, seed):
     np.testing.assert_allclose(state.locked_inertia, data.Ig.inertia, atol=1e-9)
     pin.framesForwardKinematics(model, data, q)
     corners = [
-        data.oMf[model.getFrameId(frame)].act(np.array([x, y, facts.SOLE.bottom]))[2]
-        for frame in facts.SOLE_FRAMES
-        for x in (facts.SOLE.x_min, facts.SOLE.x_max)
-        for y in (-facts.SOLE.half_width, facts.SOLE.half_width)
+        data.oMf[model.getFrameId(frame)].act(np.array([x, y, ROBOT.sole.bottom]))[2]
+        for frame in ROBOT.sole_frames
+        for x in (ROBOT.sole.x_min, ROBOT.sole.x_max)
+        for y in (-ROBOT.sole.half_width, ROBOT.sole.half_width)
     ]
     # The box is 8 mm thick; upside down its top corners are the lowest.
     assert min(corners) - 0.0081 <= state.sole_height <= min(corners) + 1e-9
-    middle = np.array([facts.SOLE.center_x, 0.0, facts.SOLE.bottom + 0.004])
-    for foot, frame in enumerate(facts.SOLE_FRAMES):
+    middle = np.array([ROBOT.sole.center_x, 0.0, ROBOT.sole.bottom + 0.004])
+    for foot, frame in enumerate(ROBOT.sole_frames):
         center = data.oMf[model.getFrameId(frame)].act(middle)
         np.testing.assert_allclose(state.sole_position[foot], center, atol=1e-9)
     up = data.oMf[model.getFrameId("chest")].rotation @ [0, 1, 0]
@@ -83,7 +85,7 @@ def test_positive_base_pitch_leans_forward(physics):
     physics.reset(np.concatenate(([0, 0, 1.0], quaternion, zeros)))
     physics.step(zeros)
     assert GroundTruth(physics).read().base_pitch == pytest.approx(0.2, abs=1e-3)
-    head, base = (physics.data.body(name).xpos[0] for name in ("head", facts.BASE_LINK))
+    head, base = (physics.data.body(name).xpos[0] for name in ("head", ROBOT.base_link))
     assert head > base
     sensors = Sensors(physics, SensorConfig())
     sensors.read()
@@ -110,7 +112,7 @@ def test_momentum_is_conserved_in_the_air(physics):
     start = truth.read()
     momentum, velocity, time = start.angular_momentum.copy(), start.com_velocity.copy(), start.time
     for _ in range(200):
-        physics.step(0.3 * facts.EFFORT_LIMIT * rng.normal(size=facts.N_JOINTS))
+        physics.step(0.3 * ROBOT.effort_limit * rng.normal(size=ROBOT.n_joints))
     state = truth.read()
     assert state.ground_force == 0.0
     np.testing.assert_allclose(state.angular_momentum, momentum, atol=0.02)

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.robot import facts
+from icub_jump_env.robot import icub
+from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import (
     BIASED_JOINTS,
@@ -19,6 +20,8 @@ from icub_jump_env.simulation.randomization import (
     draw_world,
 )
 from icub_jump_env.simulation.variation import ModelVariation
+
+ROBOT = load_robot()
 
 FIELDS = [field.name for field in dataclasses.fields(Randomization)]
 LINKS = 40
@@ -108,7 +111,7 @@ class TestDraws:
         world = draw(Randomization(), 3)
         for values in (world.link_mass, world.strength, world.joint_gain, world.damping):
             assert (values == 1.0).all()
-        assert world.friction == facts.FEET_FRICTION
+        assert world.friction == icub.FEET_FRICTION
         assert world.payload_mass == world.slope == world.push == world.sensor_noise == 0.0
         assert world.delay == 0
         assert not world.payload_offset.any()
@@ -116,7 +119,7 @@ class TestDraws:
 
     def test_biased_joints_are_the_leg_pitch_joints(self):
         world = draw(RANDOMIZATIONS["hard"], 0)
-        biased = [facts.JOINT_NAMES[joint] for joint in np.flatnonzero(world.encoder_bias)]
+        biased = [ROBOT.joint_names[joint] for joint in np.flatnonzero(world.encoder_bias)]
         assert biased == [
             "l_hip_pitch", "l_knee", "l_ankle_pitch", "r_hip_pitch", "r_knee", "r_ankle_pitch",
         ]  # fmt: skip
@@ -142,7 +145,7 @@ class TestDraws:
 
 @pytest.fixture
 def physics():
-    return Physics(0.001)
+    return Physics(ROBOT, 0.001)
 
 
 def applied(physics, **changes):
@@ -154,7 +157,7 @@ def applied(physics, **changes):
     return physics.model
 
 
-POSE = np.concatenate(([0.1, 0.2, 0.7, 1, 0, 0, 0], facts.CROUCH))
+POSE = np.concatenate(([0.1, 0.2, 0.7, 1, 0, 0, 0], ROBOT.crouch))
 
 
 def inertia_about_com(physics):
@@ -195,7 +198,7 @@ class TestModel:
     def test_the_payload_is_a_point_mass(self, physics, mass):
         """Total mass, CoM and inertia against the textbook formula."""
         inertia = inertia_about_com(physics)
-        chest = physics.data.body(facts.CHEST_LINK)
+        chest = physics.data.body(ROBOT.chest_link)
         offset = np.array([0.005, -0.008, 0.003])
         point = chest.xipos + chest.xmat.reshape(3, 3) @ offset
         old, com = physics.model.body_subtreemass[1], physics.data.subtree_com[1].copy()
@@ -215,10 +218,10 @@ class TestModel:
         """MuJoCo takes the larger of the two geoms' frictions."""
         for friction in (0.4, 1.0):
             model = applied(physics, friction=friction)
-            physics.reset(np.concatenate(([0, 0, 0.45, 0, 0, 0, 1], facts.CROUCH)))
+            physics.reset(np.concatenate(([0, 0, 0.45, 0, 0, 0, 1], ROBOT.crouch)))
             soles = {model.geom(f"{side}_sole_contact").id for side in "lr"}
             for _ in range(300):
-                physics.step(np.zeros(facts.N_JOINTS))
+                physics.step(np.zeros(ROBOT.n_joints))
                 pairs = [c for c in physics.data.contact if soles & set(c.geom)]
                 if pairs:
                     break
@@ -227,12 +230,12 @@ class TestModel:
 
     def test_a_slope_tilts_gravity_and_keeps_its_size(self, physics):
         model = applied(physics, slope=math.radians(1.5))
-        assert np.linalg.norm(model.opt.gravity) == pytest.approx(facts.GRAVITY)
+        assert np.linalg.norm(model.opt.gravity) == pytest.approx(icub.GRAVITY)
         # Uphill is forward: a ball would roll backward.
-        assert model.opt.gravity[0] == pytest.approx(-facts.GRAVITY * math.sin(math.radians(1.5)))
+        assert model.opt.gravity[0] == pytest.approx(-icub.GRAVITY * math.sin(math.radians(1.5)))
 
     def test_damping_of_the_joints_alone(self, physics):
         nominal = physics.model.dof_damping.copy()
-        model = applied(physics, damping=np.full(facts.N_JOINTS, 2.0))
+        model = applied(physics, damping=np.full(ROBOT.n_joints, 2.0))
         np.testing.assert_array_equal(model.dof_damping[:6], nominal[:6])
         np.testing.assert_allclose(model.dof_damping[6:], 2 * nominal[6:])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.robot import facts
+from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import Randomization, draw_world
 from icub_jump_env.simulation.sensor_models import (
@@ -19,14 +19,16 @@ from icub_jump_env.simulation.sensor_models import (
 )
 from icub_jump_env.simulation.sensors import Sensors
 
+ROBOT = load_robot()
+
 NOMINAL = draw_world(Randomization(), 1, np.random.default_rng(0))
-zeros = np.zeros(facts.N_JOINTS)
+zeros = np.zeros(ROBOT.n_joints)
 
 
 @pytest.fixture(scope="module")
 def physics():
-    physics = Physics(0.001)
-    physics.reset(np.concatenate(([0, 0, 0.6, 0, 0, 0, 1], facts.CROUCH)))
+    physics = Physics(ROBOT, 0.001)
+    physics.reset(np.concatenate(([0, 0, 0.6, 0, 0, 0, 1], ROBOT.crouch)))
     physics.step(zeros)
     return physics
 
@@ -98,8 +100,8 @@ def test_drift_grows_linearly(physics):
 
 @pytest.mark.parametrize("delay", [1, 3])
 def test_delay_shows_the_past(delay):
-    physics = Physics(0.001)
-    physics.reset(np.concatenate(([0, 0, 0.6, 0, 0, 0, 1], facts.CROUCH)))
+    physics = Physics(ROBOT, 0.001)
+    physics.reset(np.concatenate(([0, 0, 0.6, 0, 0, 0, 1], ROBOT.crouch)))
     delayed, present = sensors(physics, delay=delay), sensors(physics)
     now = []
     for tick in range(10):
@@ -124,9 +126,9 @@ def test_wrench_errors_reach_the_torques_through_the_transposed_jacobian(physics
     made = sensors(physics, force=SensorError(bias=10.0), moment=SensorError(bias=1.0))
     made.read()
     force, moment = (made._errors[kind].bias.reshape(2, 3) for kind in ("force", "moment"))
-    expected = np.zeros(facts.N_JOINTS)
-    moved, eps = Physics(0.001), 1e-6
-    for joint in range(facts.N_JOINTS):
+    expected = np.zeros(ROBOT.n_joints)
+    moved, eps = Physics(ROBOT, 0.001), 1e-6
+    for joint in range(ROBOT.n_joints):
         velocity, omega = sole_motion(moved, physics.data.qpos, joint, eps)
         expected[joint] = -np.sum(force * velocity) - np.sum(moment * omega)
     np.testing.assert_allclose(made.torque_error, expected, atol=1e-4)
@@ -149,8 +151,8 @@ def sole_motion(physics, qpos, joint, eps):
 
 
 def test_force_gain_scales_the_force():
-    physics = Physics(0.001)
-    physics.reset(np.concatenate(([0, 0, 0.47, 0, 0, 0, 1], facts.CROUCH)))
+    physics = Physics(ROBOT, 0.001)
+    physics.reset(np.concatenate(([0, 0, 0.47, 0, 0, 0, 1], ROBOT.crouch)))
     for _ in range(200):
         physics.step(zeros)
         if physics.data.sensor("floor_force").data[3] > 50:

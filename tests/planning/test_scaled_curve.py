@@ -1,20 +1,24 @@
-"""CoM trajectory: the paper's numbers, calculus, and refusals."""
+"""The paper's plan: its numbers, calculus, refusals, and postures."""
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from icub_jump_env.reference.com_trajectory import (
+
+from icub_jump_env.errors import CommandNotScalableError
+from icub_jump_env.planning.scaled_curve import (
     ACCELERATION_CURVE,
     DISPLACEMENT_CURVE,
+    ScaledCurvePlan,
     plan_com_trajectory,
     takeoff_velocity,
 )
-from icub_jump_env.robot.facts import GRAVITY
+from icub_jump_env.robot.icub import GRAVITY
+from icub_jump_env.robot.robot import load_robot
 
-from icub_jump_env.errors import CommandNotScalableError
-
+ROBOT = load_robot()
 CURVES = [DISPLACEMENT_CURVE, ACCELERATION_CURVE]
 
 
@@ -99,3 +103,66 @@ def test_the_largest_height_named_in_a_refusal_is_accepted():
     with pytest.raises(CommandNotScalableError, match=r"at most 0\.054 m"):
         plan_com_trajectory(0.08, com_scaling="acceleration")
     plan_com_trajectory(0.054, com_scaling="acceleration")
+
+
+class TestPlan:
+    def plan(self, displacement=None, ballistic=False):
+        return ScaledCurvePlan(plan_com_trajectory(0.04, displacement), ROBOT, ballistic)
+
+    def test_the_com_follows_the_curve_straight_up(self):
+        plan = self.plan()
+        for time in (0.0, 0.2, plan.duration):
+            rise, setpoint = plan.trajectory.sample(time), plan.sample(time)
+            np.testing.assert_array_equal(setpoint.com_position, [0, 0, rise.position])
+            np.testing.assert_array_equal(setpoint.com_velocity, [0, 0, rise.velocity])
+            np.testing.assert_array_equal(setpoint.com_acceleration, [0, 0, rise.acceleration])
+
+    def test_the_posture_is_the_crouch_and_there_is_no_momentum(self):
+        setpoint = self.plan().sample(0.3)
+        np.testing.assert_array_equal(setpoint.posture, ROBOT.crouch)
+        for still in (
+            setpoint.posture_velocity,
+            setpoint.posture_acceleration,
+            setpoint.angular_momentum,
+            setpoint.angular_momentum_rate,
+        ):
+            assert not still.any()
+
+    def test_by_default_the_com_stays_where_it_is_at_T(self):
+        plan = self.plan()
+        last, later = (self.plan().sample(plan.duration + late) for late in (0.0, 0.1))
+        for name in ("com_position", "com_velocity", "com_acceleration"):
+            np.testing.assert_array_equal(getattr(later, name), getattr(last, name))
+
+    @given(st.floats(1e-3, 0.3))
+    def test_a_ballistic_com_falls_freely_after_T(self, late):
+        """Central differences of the position, which for a parabola are exact."""
+        plan, h = self.plan(ballistic=True), 1e-4
+        times = plan.duration + late + h * np.array([-1.0, 0.0, 1.0])
+        before, here, after = (plan.sample(time).com_position[2] for time in times)
+        now = plan.sample(times[1])
+        assert (after - before) / (2 * h) == pytest.approx(now.com_velocity[2], abs=1e-9)
+        assert (after - 2 * here + before) / h**2 == pytest.approx(-GRAVITY, abs=1e-5)
+        assert now.com_acceleration[2] == -GRAVITY
+
+    def test_a_ballistic_com_takes_off_from_where_the_curve_ends_and_rises_as_commanded(self):
+        plan = self.plan(ballistic=True)
+        end = (
+            plan.sample(plan.duration).com_position[2],
+            plan.sample(plan.duration).com_velocity[2],
+        )
+        just_after = plan.sample(plan.duration + 1e-9)
+        assert end == pytest.approx((0.11, math.sqrt(2 * GRAVITY * 0.04)))
+        assert (just_after.com_position[2], just_after.com_velocity[2]) == pytest.approx(end)
+        heights = [plan.sample(t).com_position[2] for t in np.linspace(0.4, 0.7, 3001)]
+        assert max(heights) - 0.11 == pytest.approx(0.04, abs=1e-6)
+
+    @pytest.mark.parametrize("displacement", [0.11, 0.14])
+    def test_landing_posture_of_a_long_launch(self, displacement):
+        np.testing.assert_allclose(self.plan(displacement).landing_posture, ROBOT.landing)
+
+    def test_a_shorter_launch_lands_deeper(self):
+        knee = ROBOT.joint_names.index("l_knee")
+        knees = [self.plan(d).landing_posture[knee] for d in (0.05, 0.08, 0.11)]
+        assert knees == sorted(knees)
+        assert ROBOT.crouch[knee] < knees[0]
