@@ -198,10 +198,12 @@ def read_options(path: Path) -> TrainOptions:
     if not isinstance(values, dict):
         raise ConfigError("config", str(path), "a JSON object")
     top = _known("config", values, [*TrainOptions().as_dict(), COMMAND])
-    env = _known("env", top.pop("env", {}), dataclasses.asdict(TASK))
+    env = top.pop("env", {})
+    if not isinstance(env, dict):
+        raise ConfigError("env", env, "a JSON object")
     ppo = _known("ppo", top.pop("ppo", {}), dataclasses.asdict(PPOOptions()))
     top.pop(COMMAND, None)
-    jump = JumpConfig.from_kwargs({**dataclasses.asdict(TASK), **env})
+    jump = TASK.replace(**env)
     return TrainOptions(env=jump, ppo=PPOOptions(**ppo), **top)
 
 

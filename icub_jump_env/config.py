@@ -338,14 +338,14 @@ class JumpConfig:
         return round(self.controller_config.frequency / self.agent_frequency)
 
     @classmethod
-    def from_kwargs(cls, kwargs: Mapping[str, Any]) -> Self:
+    def of(cls, **keywords: Any) -> Self:
         """Build from fields and shortcuts.
 
         Raises:
             UnknownFieldError: If a keyword is neither.
             ConfigError: If a value is out of range.
         """
-        return cls().replace(**kwargs)
+        return cls().replace(**keywords)
 
     def replace(self, **changes: Any) -> Self:
         """The same with other fields or shortcuts.

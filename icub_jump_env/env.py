@@ -106,7 +106,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             UnknownFieldError: If there is no such field; a ``TypeError``.
             ConfigError: If a field is out of range.
         """
-        self.config = JumpConfig.from_kwargs(config)
+        self.config = JumpConfig.of(**config)
         self.render_mode = self.config.rendering.mode
         self.metadata = {**self.metadata, "render_fps": round(self.config.agent_frequency)}
         limit = observation.OBSERVATION_LIMIT

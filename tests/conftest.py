@@ -80,7 +80,7 @@ def random_action(rng):
 
 
 def jump(**config) -> Episode:
-    env = make_env(JumpConfig.from_kwargs(config))
+    env = make_env(JumpConfig.of(**config))
     episode = run_episode(env, seed=0)
     env.close()
     return episode

@@ -133,21 +133,21 @@ def test_checker_passes():
 
 class TestConfiguration:
     def test_bounds(self):
-        assert JumpConfig(jump_height=RANGE).jump_heights == RANGE
-        assert JumpConfig(jump_height=0.05).jump_heights == (0.05, 0.05)
+        assert JumpConfig.of(jump_height=RANGE).jump_heights == RANGE
+        assert JumpConfig.of(jump_height=0.05).jump_heights == (0.05, 0.05)
 
     def test_a_single_command_is_asked_for(self):
-        assert JumpConfig(jump_height=0.05).commanded_height == 0.05
+        assert JumpConfig.of(jump_height=0.05).commanded_height == 0.05
         with pytest.raises(ConfigError, match=r"jump_height=\(0\.03, 0\.07\) .* a single height"):
-            _ = JumpConfig(jump_height=RANGE).commanded_height
+            _ = JumpConfig.of(jump_height=RANGE).commanded_height
 
     @pytest.mark.parametrize("heights", [list(RANGE), np.array(RANGE)])
     def test_lists_and_arrays_become_plain_and_come_back_from_json(self, heights):
-        config = JumpConfig(jump_height=heights)
-        assert config == JumpConfig(jump_height=RANGE)
-        assert hash(config) == hash(JumpConfig(jump_height=RANGE))
+        config = JumpConfig.of(jump_height=heights)
+        assert config == JumpConfig.of(jump_height=RANGE)
+        assert hash(config) == hash(JumpConfig.of(jump_height=RANGE))
         saved = json.loads(json.dumps(dataclasses.asdict(config)))
-        assert JumpConfig.from_kwargs(saved) == config
+        assert JumpConfig.of(**saved) == config
 
     @pytest.mark.parametrize(
         ("heights", "words"),
@@ -162,7 +162,7 @@ class TestConfiguration:
     )  # fmt: skip
     def test_refusals(self, env, heights, words):
         for refused in (
-            lambda: JumpConfig(jump_height=heights),
+            lambda: JumpConfig.of(jump_height=heights),
             lambda: env.unwrapped.reset(options={"jump_height": heights}),
         ):
             with pytest.raises(ConfigError) as refusal:
@@ -173,13 +173,13 @@ class TestConfiguration:
 
     def test_ragged_lists_are_refused_in_other_fields_as_well(self):
         with pytest.raises(ConfigError, match="residual_scale"):
-            JumpConfig(residual_scale=[[1], [1, 2], 3])
+            JumpConfig.of(residual_scale=[[1], [1, 2], 3])
         with pytest.raises(ConfigError, match="friction"):
-            JumpConfig(randomization={"friction": [[1], [1, 2]]})
+            JumpConfig.of(randomization={"friction": [[1], [1, 2]]})
 
     @pytest.mark.parametrize("heights", [(0.03, 0.08), (0.08, 0.08)])
     def test_both_ends_must_be_reachable(self, heights):
         with pytest.raises(ConfigError, match=r"jump_height=0\.08 .*at most.*acceleration"):
-            JumpConfig(jump_height=heights, com_scaling="acceleration")
+            JumpConfig.of(jump_height=heights, com_scaling="acceleration")
         with pytest.raises(ConfigError, match=r"com_displacement=0\.03 .*for jump_height=0\.08"):
-            JumpConfig(jump_height=heights, com_displacement=0.03)
+            JumpConfig.of(jump_height=heights, com_displacement=0.03)

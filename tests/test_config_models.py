@@ -17,17 +17,17 @@ from icub_jump_env.simulation.sensor_models import SENSORS, SensorConfig, Sensor
 
 
 def test_models_come_back_from_json():
-    config = JumpConfig(
+    config = JumpConfig.of(
         actuators=ActuatorConfig(torque_loop=CurrentControl(100.0), motor=DCMotor(0.9)),
         sensors=SensorConfig(gyro=SensorError(noise=0.1), delay=1),
         randomization=Randomization(friction=(0.4, 1)),
     )
     saved = json.loads(json.dumps(dataclasses.asdict(config)))
-    assert JumpConfig.from_kwargs(saved) == config
+    assert JumpConfig.of(**saved) == config
 
 
 def test_names_stand_for_models():
-    config = JumpConfig(actuators="realistic", sensors="realistic", randomization="mild")
+    config = JumpConfig.of(actuators="realistic", sensors="realistic", randomization="mild")
     assert config.actuator_config == ACTUATORS["realistic"]
     assert config.sensor_config == SENSORS["realistic"]
     assert config.randomization_config == RANDOMIZATIONS["mild"]
@@ -43,7 +43,7 @@ def test_names_stand_for_models():
 )  # fmt: skip
 def test_bad_models_are_refused(field, value):
     with pytest.raises(ConfigError) as refusal:
-        JumpConfig(**{field: value})
+        JumpConfig.of(**{field: value})
     assert refusal.value.field == field
 
 
@@ -70,13 +70,13 @@ def test_bad_models_are_refused(field, value):
 )  # fmt: skip
 def test_a_bad_value_inside_a_model_names_its_field_and_range(field, value, words):
     with pytest.raises(ConfigError) as refusal:
-        JumpConfig(**{field: value})
+        JumpConfig.of(**{field: value})
     for word in words:
         assert word in str(refusal.value)
 
 
 def test_numpy_values_become_plain():
-    config = JumpConfig(
+    config = JumpConfig.of(
         sensors={"delay": np.int64(1), "gyro": {"noise": np.float32(0.5)}},
         randomization={"friction": np.array([0.4, 0.5])},
         actuators={"friction": np.float64(0.05), "servo": {"stiffness": np.int32(1000)}},

@@ -131,7 +131,7 @@ class TestPush:
         velocity = {}
         for push in (-2.0, 0.0, 2.0):
             ranges = Randomization(push=(push, push))
-            env = make_env(JumpConfig(controller=controller, randomization=ranges))
+            env = make_env(JumpConfig.of(controller=controller, randomization=ranges))
             _, info = env.reset(seed=1)
             end = info["world"]["push_time"] * (0.43 - PUSH_DURATION) + PUSH_DURATION
             while env.data.time < end:
@@ -144,7 +144,7 @@ class TestPush:
 class TestEffects:
     def test_strength_limits_the_torques(self):
         env = make_env(
-            JumpConfig(controller="torque", randomization=Randomization(strength=(0.8, 0.8)))
+            JumpConfig.of(controller="torque", randomization=Randomization(strength=(0.8, 0.8)))
         )
         env.reset(seed=0)
         most = np.zeros(23)
@@ -156,7 +156,7 @@ class TestEffects:
 
     def test_encoder_bias_moves_the_crouch_the_other_way(self):
         """The servos hold what the encoders show, so the joints are off by the bias."""
-        env = make_env(JumpConfig(randomization=Randomization(encoder_bias=(0.015, 0.015))))
+        env = make_env(JumpConfig.of(randomization=Randomization(encoder_bias=(0.015, 0.015))))
         _, info = env.reset(seed=0)
         bias = np.array(info["world"]["encoder_bias"])
         shown = env._simulation.sensors.joint_position
@@ -166,7 +166,7 @@ class TestEffects:
     def test_both_sources_of_encoder_bias_show_and_servos_see_them(self):
         ranges = Randomization(encoder_bias=(0.01, 0.01))
         biased = SensorConfig(joint_position=SensorError(bias=0.004))
-        env = make_env(JumpConfig(randomization=ranges, sensors=biased))
+        env = make_env(JumpConfig.of(randomization=ranges, sensors=biased))
         _, info = env.reset(seed=0)
         own = np.array(info["sensor_errors"]["joint_position"]["bias"])
         assert 0.001 < np.abs(own).max() <= 0.004
@@ -176,7 +176,7 @@ class TestEffects:
         np.testing.assert_allclose(shown, env._crouch, atol=0.012)
 
     def test_sensor_noise_is_that_of_the_realistic_sensors(self):
-        env = make_env(JumpConfig(randomization=Randomization(sensor_noise=(1.0, 1.0))))
+        env = make_env(JumpConfig.of(randomization=Randomization(sensor_noise=(1.0, 1.0))))
         env.reset(seed=0)
         sensors, errors = env._simulation.sensors, []
         for _ in range(200):
@@ -189,7 +189,7 @@ class TestEffects:
     def test_sensor_errors_differ_between_seeds_and_not_with_other_errors(self):
         def gyro_bias(seed, **other):
             config = SensorConfig(gyro=SensorError(bias=0.1), **other)
-            env = make_env(JumpConfig(sensors=config))
+            env = make_env(JumpConfig.of(sensors=config))
             return env.reset(seed=seed)[1]["sensor_errors"]["gyro"]["bias"]
 
         alone = gyro_bias(7)
@@ -203,7 +203,7 @@ class TestEffects:
         torques = []
         for sensors in (SensorConfig(), biased):
             env = make_env(
-                JumpConfig(controller="torque", actuators="torque_feedback", sensors=sensors)
+                JumpConfig.of(controller="torque", actuators="torque_feedback", sensors=sensors)
             )
             env.reset(seed=0)
             for _ in range(5):
@@ -216,14 +216,14 @@ class TestEffects:
         errors = []
         for gain in (0.5, 1.0):
             ranges = Randomization(joint_gain=(gain, gain), payload_mass=(3.0, 3.0))
-            env = make_env(JumpConfig(randomization=ranges))
+            env = make_env(JumpConfig.of(randomization=ranges))
             env.reset(seed=0)
             errors.append(np.abs(env.data.qpos[7:] - env._crouch).max())
         assert errors[0] > 1.3 * errors[1]
 
     def test_friction_acts_in_full_while_a_motor_brakes_at_its_limit(self):
         """MuJoCo clamps motor torques at the effort limit, but not what friction adds."""
-        env = make_env(JumpConfig(actuators="realistic"))
+        env = make_env(JumpConfig.of(actuators="realistic"))
         env.reset(seed=0)
         simulation, data = env._simulation, env.data
         data.qvel[6:] = 3.0
@@ -235,7 +235,7 @@ class TestEffects:
 
     def test_slope_shows_in_the_imu(self):
         slope = 0.02
-        env = make_env(JumpConfig(randomization=Randomization(slope=(slope, slope))))
+        env = make_env(JumpConfig.of(randomization=Randomization(slope=(slope, slope))))
         env.reset(seed=0)
         base_pitch = env.snapshot().base_pitch
         gravity = env._simulation.sensors.gravity

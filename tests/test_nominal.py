@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from conftest import jump
+from icub_jump_env.evaluation.paper import PAPER as PAPERS
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.paper import PAPER as PAPERS
 from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.robot.robot import load_robot
 
@@ -60,7 +60,7 @@ def test_within_the_limits(nominal):
 
 
 def test_no_solver_failure_and_hard_rows_held():
-    env = make_env(JumpConfig(agent_frequency=200.0))
+    env = make_env(JumpConfig.of(agent_frequency=200.0))
     env.reset(seed=0)
     residuals = []
     terminated = False

@@ -14,7 +14,7 @@ SHIFT = np.array([0.4, 0.2, -0.5], np.float32)
 
 def after_the_launch(action, phases, stand_time=0.4):
     """Observations and costs of an episode whose launch is the baseline's."""
-    env = make_env(JumpConfig(stand_time=stand_time, residual_phases=phases))
+    env = make_env(JumpConfig.of(stand_time=stand_time, residual_phases=phases))
     env.reset(seed=0)
     observations, costs, terminated, phase = [], [], False, "launch"
     while not terminated:
@@ -49,7 +49,7 @@ def test_in_all_phases_later_actions_move_the_robot_and_cost():
 
 def test_the_posture_follows_the_residual_to_the_shift_of_the_com():
     """At rest the joints have moved as far as it takes to shift the CoM over resting feet."""
-    env = make_env(JumpConfig(residual_phases="all"))
+    env = make_env(JumpConfig.of(residual_phases="all"))
     env.reset(seed=0)
     controller, sensors = env._controller, env._simulation.sensors
     controller.phases.phase = Phase.LANDING

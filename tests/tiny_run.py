@@ -22,7 +22,7 @@ ARGUMENTS = (
 
 
 UNUSUAL = TrainOptions(
-    env=JumpConfig(
+    env=JumpConfig.of(
         controller="torque",
         jump_height=0.03,
         com_scaling="acceleration",

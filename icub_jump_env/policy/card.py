@@ -163,7 +163,7 @@ def _check_config(config: Any) -> JumpConfig:
         return config
     # Before there was a choice, it was this robot.
     explicit = {"robot": DEFAULT_MODEL, **check_mapping("config", config)}
-    checked = JumpConfig.from_kwargs(explicit)
+    checked = JumpConfig.of(**explicit)
     for field in TASK_FIELDS:
         # Else the policy would change with the default.
         if field not in explicit and group_of(field) not in explicit:

@@ -1,6 +1,5 @@
 """The launch alone: its steps, its rewards, and what an agent sees and does in it."""
 
-import dataclasses
 import functools
 import pickle
 
@@ -16,7 +15,7 @@ from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy import NetworkPolicy
 from icub_jump_env.policy.fields import AXES
 
-CONFIG = dataclasses.replace(TASK, stand_time=0.1)
+CONFIG = TASK.replace(stand_time=0.1)
 NAMES = tuple(entry_scales())
 SOME = ("gyro.y", "launch_progress", "com_error.x")
 STEPS = acting_steps(CONFIG)
@@ -87,7 +86,7 @@ def test_actions_are_scaled():
 
 def test_a_jump_that_is_over_before_takes_as_many_steps():
     """Shifted sideways by 10 cm the robot falls in the launch."""
-    config = JumpConfig(jump_height=0.02, residual_scale=(0.1, 0.1, 0.1))
+    config = JumpConfig.of(jump_height=0.02, residual_scale=(0.1, 0.1, 0.1))
     steps = acting_steps(config)
     actions = np.tile(np.array([0, 1, 0], np.float32), (steps, 1))
     _, all_rewards, plain_info = plain(config, actions)
@@ -105,7 +104,7 @@ def test_a_jump_that_is_over_before_takes_as_many_steps():
 @pytest.mark.parametrize("scaling", ["displacement", "acceleration"])
 @pytest.mark.parametrize("height", [0.02, 0.04])
 def test_no_launch_of_the_range_is_longer(scaling, height):
-    config = JumpConfig(jump_height=(0.02, 0.04), com_scaling=scaling)
+    config = JumpConfig.of(jump_height=(0.02, 0.04), com_scaling=scaling)
     env = make_env(config)
     observation, _ = env.reset(options={"jump_height": height})
     duration = observation[NAMES.index("takeoff_time")] * entry_scales()["takeoff_time"]

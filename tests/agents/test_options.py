@@ -1,6 +1,5 @@
 """What train.py can be asked for, on the command line and in files."""
 
-import dataclasses
 import json
 
 import pytest
@@ -24,7 +23,7 @@ def test_a_file_says_what_it_wants_and_the_task_the_rest(tmp_path):
     file = tmp_path / "options.json"
     file.write_text('{"env": {"controller": "torque"}, "ppo": {"epochs": 3}, "seed": 4}')
     assert read_options(file) == TrainOptions(
-        env=dataclasses.replace(TASK, controller="torque"), ppo=PPOOptions(epochs=3), seed=4
+        env=TASK.replace(controller="torque"), ppo=PPOOptions(epochs=3), seed=4
     )
 
 
@@ -76,7 +75,10 @@ def test_a_missing_file_is_refused(tmp_path):
         ({"jobs": 0}, "jobs=0 is not allowed: a whole number from 1 to 1000"),
         ({"checkpoint_every": 0}, "checkpoint_every=0 is not allowed: a whole number from 1"),
         ({"jobs": 7}, "jobs=7 is not allowed: a divisor of ppo.episodes=64"),
-        ({"env": JumpConfig(render_mode="rgb_array")}, "render_mode='rgb_array' is not allowed"),
+        (
+            {"env": JumpConfig.of(render_mode="rgb_array")},
+            "render_mode='rgb_array' is not allowed",
+        ),
     ],
 )
 def test_a_value_out_of_range_is_refused(changes, message):
@@ -121,6 +123,6 @@ def test_a_plan_sees_the_command_and_the_time_alone():
 
 
 def test_the_default_folder_is_named_by_controller_and_seed():
-    torque = TrainOptions(env=JumpConfig(controller="torque"), seed=3)
+    torque = TrainOptions(env=JumpConfig.of(controller="torque"), seed=3)
     assert str(torque.folder) == "runs/torque-seed3"
     assert json.dumps(torque.as_dict())  # paths are not in it

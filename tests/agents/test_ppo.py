@@ -16,9 +16,7 @@ from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy.fields import AXES
 
-OPTIONS = TrainOptions(
-    env=dataclasses.replace(TASK, stand_time=0.1), ppo=PPO, jobs=1, timesteps=1000
-)
+OPTIONS = TrainOptions(env=TASK.replace(stand_time=0.1), ppo=PPO, jobs=1, timesteps=1000)
 ROLLOUT = 2 * acting_steps(OPTIONS.env)
 
 

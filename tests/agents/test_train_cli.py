@@ -89,7 +89,7 @@ def test_flags_reach_the_options(asked):
     assert asked("--controller", "torque", "--inputs", "command", "--axes", "forward", "lateral",
                  "--ppo.log-std", "-0.5", "-3", "--ppo.hidden", "32", "--seed", "7",
                  "--run", "here") == TrainOptions(
-        env=dataclasses.replace(TASK, controller="torque"),
+        env=TASK.replace(controller="torque"),
         inputs="command",
         axes=("forward", "lateral"),
         ppo=PPOOptions(log_std=(-0.5, -3.0), hidden=(32,)),
@@ -102,7 +102,7 @@ def test_a_file_holds_where_the_command_line_says_nothing(asked, run):
     file = Path("run/options.json")
     config = dataclasses.replace(run, config=file)
     assert asked("--config", str(file)) == config
-    assert asked(f"--config={file}", "--seed", "6") == dataclasses.replace(config, seed=6)
+    assert asked(f"--config={file}", "--seed", "6") == config.replace(seed=6)
     # What fits together depends on the file: by default there are 64 episodes and 8 jobs.
     assert asked("--config", str(file), "--jobs", "2").jobs == 2
     assert asked("--config", str(file), "--ppo.episodes", "9").ppo.episodes == 9

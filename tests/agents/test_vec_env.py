@@ -24,7 +24,7 @@ from icub_jump_env.evaluation.episodes.workers import WorkerError
 from icub_jump_env.policy import BASELINE
 
 ACTION = np.zeros((2, 1), np.float32)
-CONFIG = JumpConfig(stand_time=0.0)
+CONFIG = JumpConfig.of(stand_time=0.0)
 
 
 def troubled(*troubles):

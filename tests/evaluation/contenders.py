@@ -38,7 +38,7 @@ def save(path, policy, **config):
     """A policy on disk, trained in the environment of ``config``."""
     path.parent.mkdir(parents=True, exist_ok=True)
     save_policy(
-        path, policy, config=JumpConfig(**config), versions={}, command=(), seed=0, results={}
+        path, policy, config=JumpConfig.of(**config), versions={}, command=(), seed=0, results={}
     )
     return path
 

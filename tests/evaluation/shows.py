@@ -3,7 +3,7 @@
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.modes.view import FRAME
 
-SHORT = JumpConfig(stand_time=0.1)
+SHORT = JumpConfig.of(stand_time=0.1)
 
 
 class Clock:

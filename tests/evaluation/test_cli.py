@@ -110,7 +110,7 @@ def test_flags_reach_the_configuration():
         ["--jump-height", "0.05", "0.06", "--no-momentum-control", "--residual_scale", "0.01", "0.02",
          "0.03", "--com-displacement", "0.1", "--solver", "osqp"],
     )  # fmt: skip
-    assert options.config == JumpConfig(
+    assert options.config == JumpConfig.of(
         jump_height=(0.05, 0.06),
         momentum_control=False,
         residual_scale=(0.01, 0.02, 0.03),

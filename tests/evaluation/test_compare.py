@@ -152,7 +152,7 @@ class TestCommand:
         assert len({e["jump_height"] for e in baseline}) == 3
         assert len({e["world"]["friction"] for e in baseline}) == 3
         assert found["idle"] == baseline
-        env = make_env(JumpConfig(**RANDOM))
+        env = make_env(JumpConfig.of(**RANDOM))
         for policy, name in (((), "baseline"), ((FEEDBACK,), "busy")):
             expected = [run_episode(env, seed, *policy) for seed in (5, 6, 7)]
             assert [e["jump"]["flight_height"] for e in found[name]] == [

@@ -37,7 +37,7 @@ def refusal(capsys, *arguments):
 
 def jump_of(policy, **config):
     """Metrics as JSON has them: of the policy, or of the baseline."""
-    env = make_env(JumpConfig(stand_time=0.1, **config))
+    env = make_env(JumpConfig.of(stand_time=0.1, **config))
     episode = run_episode(env, 0, *([policy] if policy else []))
     env.close()
     return json.loads(json.dumps(episode.jump))
@@ -127,12 +127,12 @@ class TestAsTrained:
         code, _, err = evaluate(capsys, *arguments, *SHORT, "--json", "r.json")
         assert code == 0, err
         content = json.loads((tmp_path / "r.json").read_text())
-        return JumpConfig.from_kwargs(content["config"])
+        return JumpConfig.of(**content["config"])
 
     def test_what_the_policy_depends_on_is_as_the_card_says_and_nothing_else(
         self, capsys, tmp_path, file
     ):
-        assert self.config(capsys, tmp_path, "--policy", file) == JumpConfig(
+        assert self.config(capsys, tmp_path, "--policy", file) == JumpConfig.of(
             stand_time=0.1, com_displacement=0.1, residual_scale=(0.03, 0.01, 0.01),
             agent_frequency=50.0,
         )  # fmt: skip
@@ -147,7 +147,7 @@ class TestAsTrained:
             "--sensors", "realistic", "--solver", "osqp",
         ]  # fmt: skip
         found = self.config(capsys, tmp_path, "--policy", file, *flags)
-        assert found == JumpConfig(
+        assert found == JumpConfig.of(
             stand_time=0.1, com_displacement=0.1, residual_scale=(0.03, 0.01, 0.01),
             agent_frequency=50.0, control_frequency=200.0, jump_height=0.05,
             sensors="realistic", solver="osqp",
@@ -194,7 +194,7 @@ class TestOtherModes:
         log = tmp_path / "log.jsonl"
         header = json.loads(log.read_text().splitlines()[0])
         assert header["policy"] == identity
-        env = make_env(JumpConfig(randomization="full", stand_time=0.1))
+        env = make_env(JumpConfig.of(randomization="full", stand_time=0.1))
         episodes = EpisodeLog(log, header, resume=True).episodes
         assert list(episodes.values()) == [run_episode(env, seed, FEEDBACK) for seed in (0, 1)]
 
@@ -225,7 +225,7 @@ class TestOtherModes:
         assert evaluate(capsys, *common, "--view")[0] == 0
         assert evaluate(capsys, *common, "--video", "jump.mp4")[0] == 0
         for config, seed, policy in asked:
-            assert config == JumpConfig(com_displacement=0.1, stand_time=0.1)
+            assert config == JumpConfig.of(com_displacement=0.1, stand_time=0.1)
             assert seed == 3
             assert policy.card == load_policy(file).card
         assert len(asked) == 2
@@ -247,7 +247,7 @@ class TestOtherModes:
 
     def test_what_is_shown_live_is_the_policys_jump(self, monkeypatch):
         """The screen wants a step per control tick; the policy acts as often as ever."""
-        config = JumpConfig(stand_time=0.1)
+        config = JumpConfig.of(stand_time=0.1)
         shown = []
 
         class Show:
@@ -358,7 +358,7 @@ def test_the_default_log_is_another_one_after_the_code_has_changed(monkeypatch):
 
 def test_a_series_is_completed_from_its_log(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    series = Series(JumpConfig(stand_time=0.0), range(2))
+    series = Series(JumpConfig.of(stand_time=0.0), range(2))
     episodes = series.complete(1, QUIET)
     assert [episode.seed for episode in episodes] == [0, 1]
     monkeypatch.setattr(

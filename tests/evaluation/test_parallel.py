@@ -19,10 +19,10 @@ from icub_jump_env.evaluation.episodes.workers import WorkerError
 
 REPOSITORY = Path(__file__).parents[2]
 
-JUMP = JumpConfig(stand_time=0.0)
-GROUNDED = JumpConfig(control_frequency=1.0, agent_frequency=1.0)
+JUMP = JumpConfig.of(stand_time=0.0)
+GROUNDED = JumpConfig.of(control_frequency=1.0, agent_frequency=1.0)
 """Too slow a controller to take off: most metrics are undefined."""
-VARIED = JumpConfig(stand_time=0.0, randomization="full", sensors="realistic")
+VARIED = JumpConfig.of(stand_time=0.0, randomization="full", sensors="realistic")
 
 
 def episodes(config, count):
@@ -71,7 +71,7 @@ def test_results_do_not_depend_on_the_jobs(capfd):
 
 def test_results_come_in_the_order_of_the_work(quiet):
     """The first one takes longest."""
-    work = [Job(JumpConfig(stand_time=3.0), 7), *episodes(JUMP, 3)]
+    work = [Job(JumpConfig.of(stand_time=3.0), 7), *episodes(JUMP, 3)]
     assert [episode.seed for episode in run_all(work, 2, quiet)] == [7, 0, 1, 2]
 
 
@@ -109,7 +109,7 @@ from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
 
 if __name__ == "__main__":
     try:
-        work = [Job(JumpConfig(stand_time=0.0), seed) for seed in range(10_000)]
+        work = [Job(JumpConfig.of(stand_time=0.0), seed) for seed in range(10_000)]
         for number, _ in enumerate(run_jobs(work, jobs=2)):
             if number == 2:
                 print("running", flush=True)

@@ -32,7 +32,7 @@ from icub_jump_env.evaluation.statistics.paper import comparison_rows
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 
-CONFIG = JumpConfig(stand_time=0.1, agent_frequency=10.0)  # few pictures in the videos
+CONFIG = JumpConfig.of(stand_time=0.1, agent_frequency=10.0)  # few pictures in the videos
 QUIET = Console(file=io.StringIO())
 CHROMIUM, CHROMEDRIVER = "/usr/bin/chromium", "/usr/bin/chromedriver"
 MOMENTS = ["Crouch", "Take-off", "Apex", "First impact", "Stands"]
@@ -149,7 +149,7 @@ def test_page_is_accessible(read):
 
 @pytest.mark.parametrize("controller", ["velocity", "torque"])
 def test_table_says_what_the_jump_did(read, controller):
-    config = JumpConfig(controller=controller, stand_time=0.1)
+    config = JumpConfig.of(controller=controller, stand_time=0.1)
     arms = [
         jump(controller=controller, stand_time=0.1, momentum_control=posed)
         for posed in (True, False)
@@ -200,7 +200,7 @@ def test_moments_are_those_of_the_metrics(shots):
     assert 0.0 <= off - takeoff + 1e-9 < tick
     assert 0.0 <= impact - (takeoff + flight) + 1e-9 < tick
     assert apex == pytest.approx(takeoff + episode.jump["takeoff_velocity"] / 9.81, abs=2 * tick)
-    assert end == pytest.approx(impact + CONFIG.stand_time, abs=2 * tick)
+    assert end == pytest.approx(impact + CONFIG.success.stand_time, abs=2 * tick)
 
 
 def test_pictures_show_the_robot_at_these_moments(shots):
@@ -225,7 +225,7 @@ def test_the_strip_fits_a_readme(shots):
 
 def test_without_take_off_there_are_two_moments(pictures):
     weak = ActuatorConfig(motor=DCMotor(current_limit=0.3))
-    config = JumpConfig(actuators=weak)
+    config = JumpConfig.of(actuators=weak)
     names = [shot.name for shot in take_snapshots(config, traced_episode(config))]
     assert names == ["Crouch", "End"]
 
@@ -240,7 +240,7 @@ def unseen(monkeypatch, pictures):
 
 def test_other_jumps_are_told_from_the_papers(unseen, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "argv", ["eval.py", "--report", "<script>alert(1)</script>"])
-    config = JumpConfig(jump_height=0.05, momentum_control=False, stand_time=1.0)
+    config = JumpConfig.of(jump_height=0.05, momentum_control=False, stand_time=1.0)
     text = report.write_report(tmp_path, config, 3, QUIET).read_text()
     read = Reader(text)
     assert read.all("script") == []
@@ -288,7 +288,7 @@ def test_refuses_before_any_work_without_the_extra(idle, monkeypatch, tmp_path):
 
 
 def test_refuses_before_any_work_what_one_controller_cannot_do(idle, pictures, tmp_path):
-    only_torque = JumpConfig(controller="torque", agent_frequency=500.0)
+    only_torque = JumpConfig.of(controller="torque", agent_frequency=500.0)
     with pytest.raises(ConfigError, match="agent_frequency"):
         report.write_report(tmp_path, only_torque, 0, QUIET)
 

@@ -36,7 +36,7 @@ class Watched:
 
 
 def test_an_episode_says_what_was_asked_for_and_what_came_of_it():
-    config = JumpConfig(jump_height=(0.03, 0.05), stand_time=0.1)
+    config = JumpConfig.of(jump_height=(0.03, 0.05), stand_time=0.1)
     env = make_env(config)
     episode = run_episode(env, 3)
     _, rewards, info = rollout(env, seed=3)
@@ -48,7 +48,7 @@ def test_an_episode_says_what_was_asked_for_and_what_came_of_it():
 
 @pytest.mark.parametrize("controller", ["velocity", "torque"])
 def test_the_policy_that_does_nothing_is_the_baseline_to_the_bit(controller):
-    env = make_env(JumpConfig(controller=controller, **RANDOM))
+    env = make_env(JumpConfig.of(controller=controller, **RANDOM))
     baseline = run_episode(env, 2)
     assert run_episode(env, 2, constant(0, 0, 0)) == baseline
     acted = run_episode(env, 2, FEEDBACK)
@@ -59,7 +59,7 @@ def test_the_policy_that_does_nothing_is_the_baseline_to_the_bit(controller):
 @pytest.mark.parametrize(("controller", "hold"), [("velocity", 2), ("torque", 5)])
 def test_a_held_action_makes_the_traced_episode_the_plain_one(controller, hold):
     """To the bit, although the environment is stepped more often."""
-    config = JumpConfig(controller=controller, **RANDOM)
+    config = JumpConfig.of(controller=controller, **RANDOM)
     assert config.controls_per_step == hold
     plain, held = Watched(FEEDBACK), Watched(FEEDBACK)
     expected = run_episode(make_env(config), 2, plain)
@@ -76,7 +76,7 @@ def test_a_held_action_makes_the_traced_episode_the_plain_one(controller, hold):
 
 def test_the_single_jump_is_the_same_with_and_without_figures():
     """For which the environment is stepped at the control rate."""
-    config = JumpConfig(stand_time=0.1)
+    config = JumpConfig.of(stand_time=0.1)
     console = Console(file=io.StringIO())
     plain, drawn = (
         run_nominal(config, 0, trace, console, Contender("feedback", FEEDBACK, card=object()))

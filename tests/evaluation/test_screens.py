@@ -1,7 +1,6 @@
 """The screens: a stage of their own, a page for this machine alone, a window on a display."""
 
 import contextlib
-import dataclasses
 import gc
 import io
 import json
@@ -156,7 +155,7 @@ def test_the_episode_in_the_browser_is_that_of_run_episode(browser_screen):
         pace, never = Playback(clock=clock), threading.Event()
         episode = Show(env, 0, screen, pace, never, clock, clock.sleep).run()
     env.close()
-    assert episode == jump(stand_time=SHORT.stand_time)
+    assert episode == jump(stand_time=SHORT.success.stand_time)
 
 
 def test_every_button_and_key_of_the_page_has_its_command(monkeypatch):
@@ -292,7 +291,7 @@ def test_the_environment_shows_itself_in_such_a_window(viewer, monkeypatch):
     """In real time, and out of reach of what its user does there."""
     slept = []
     monkeypatch.setattr("time.sleep", slept.append)
-    env = make_env(dataclasses.replace(SHORT, render_mode="human"))
+    env = make_env(SHORT.replace(render_mode="human"))
     env.reset(seed=0)
     for _ in range(3):
         env.step(np.zeros(3, np.float32))

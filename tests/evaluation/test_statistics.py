@@ -224,7 +224,7 @@ class TestCommand:
     @pytest.mark.parametrize("landed", [True, False])
     def test_of_a_single_episode_its_values_are_shown(self, landed):
         done = [episode(7, None if landed else Failure.SLIPPED, flight_height=0.0412)]
-        options = EvalOptions(JumpConfig(randomization="full"), seed=7)
+        options = EvalOptions(JumpConfig.of(randomization="full"), seed=7)
         title, table, lines = statistics.render(done, options, BASELINE)
         assert title.endswith("randomization full, seed 7")
         assert [column.header for column in table.columns] == ["", "value"]
@@ -252,10 +252,10 @@ class TestRangeOfCommands:
         assert log.name.startswith("velocity-baseline-3to5cm-none-")
         lines = [json.loads(line) for line in log.read_text().splitlines()[1:]]
         heights = [line["jump_height"] for line in lines]
-        env = make_env(JumpConfig(jump_height=(0.03, 0.05)))
+        env = make_env(JumpConfig.of(jump_height=(0.03, 0.05)))
         assert heights == [env.reset(seed=seed)[1]["jump_height"] for seed in range(3)]
         for seed, line in enumerate(lines):
-            alone = make_env(JumpConfig(jump_height=heights[seed], stand_time=0.0))
+            alone = make_env(JumpConfig.of(jump_height=heights[seed], stand_time=0.0))
             assert line["jump"]["flight_height"] == run_episode(alone, seed).jump["flight_height"]
 
         cli.evaluate([*arguments, "--resume"])
@@ -269,18 +269,18 @@ class TestRangeOfCommands:
         assert "all episodes will be alike" in captured.err
 
     def test_one_episode_of_it_is_no_nominal_jump(self):
-        assert EvalOptions(JumpConfig(jump_height=(0.03, 0.05))).mode == "statistics"
-        assert EvalOptions(JumpConfig(jump_height=0.03)).mode == "nominal"
+        assert EvalOptions(JumpConfig.of(jump_height=(0.03, 0.05))).mode == "statistics"
+        assert EvalOptions(JumpConfig.of(jump_height=0.03)).mode == "nominal"
 
     def test_the_log_is_that_of_its_range(self, tmp_path):
         paths = {
-            series.Series(JumpConfig(jump_height=heights), range(2)).default_log()
+            series.Series(JumpConfig.of(jump_height=heights), range(2)).default_log()
             for heights in (0.03, (0.03, 0.03), (0.03, 0.05), (0.03, 0.050000001))
         }
         assert len(paths) == 4
 
     def test_the_line_that_replays_a_failure_has_its_command(self):
-        config = JumpConfig(jump_height=(0.03, 0.05))
+        config = JumpConfig.of(jump_height=(0.03, 0.05))
         episodes = [
             episode(seed, failure, jump_height=height, flight_height=0.02)
             for seed, failure, height in ((0, None, 0.03), (1, Failure.TOO_LOW, 0.1 + 0.2 - 0.25))
@@ -288,7 +288,9 @@ class TestRangeOfCommands:
         *_, lines = statistics.render(episodes, EvalOptions(config, episodes=2), BASELINE)
         command = lines.splitlines()[-1].partition("eval.py ")[2]
         options = cli.parse(EvalOptions, shlex.split(command))
-        assert options == EvalOptions(JumpConfig(jump_height=0.1 + 0.2 - 0.25), seed=1, view=True)
+        assert options == EvalOptions(
+            JumpConfig.of(jump_height=0.1 + 0.2 - 0.25), seed=1, view=True
+        )
 
 
 class TestFigure:
@@ -383,8 +385,8 @@ def test_killed_and_resumed_equals_uninterrupted(tmp_path, jobs, signals):
 def test_replay_arguments_give_the_configuration_back():
     for config in (
         JumpConfig(),
-        JumpConfig(jump_height=(0.03, 0.1 + 0.2 - 0.25)),
-        JumpConfig(
+        JumpConfig.of(jump_height=(0.03, 0.1 + 0.2 - 0.25)),
+        JumpConfig.of(
             controller="torque", momentum_control=False, residual_scale=(0.01, 0.02, 0.03),
             randomization=Randomization(friction=(0.3, 0.5)), sensors="realistic",
             control_frequency=250.0, agent_frequency=50.0,

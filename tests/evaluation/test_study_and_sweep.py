@@ -13,7 +13,7 @@ from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation.actuators.torque_loops import CurrentControl, TorqueFeedback
 from icub_jump_env.simulation.sensor_models import SENSORS
 
-SHORT = JumpConfig(stand_time=0.1)
+SHORT = JumpConfig.of(stand_time=0.1)
 
 
 def consoles():
@@ -102,7 +102,7 @@ class TestSweep:
         monkeypatch.setattr(sweep, "HEIGHTS", (0.04,))
         monkeypatch.setattr(sweep, "DISPLACEMENTS", (0.11,))
         console, progress = consoles()
-        config = JumpConfig(momentum_control=False, stand_time=1.5)
+        config = JumpConfig.of(momentum_control=False, stand_time=1.5)
         sweep.run(EvalOptions(config, sweep=True), (), console, progress)
         rise = 100 * jump(momentum_control=False, stand_time=1.5).jump["flight_height"]
         assert f"({rise:.2f})" in console.file.getvalue()

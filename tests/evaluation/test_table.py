@@ -44,7 +44,7 @@ def test_units_and_differences():
 def test_the_torque_controller_is_compared_with_the_papers_torque_controller():
     table = {
         r.quantity: r
-        for r in comparison_rows(JumpConfig(controller="torque"), episode(), episode())
+        for r in comparison_rows(JumpConfig.of(controller="torque"), episode(), episode())
     }
     assert table["flight height (CoM)"].paper == pytest.approx(1.6)
     assert table["sole height"].paper == pytest.approx(2.3)
@@ -52,7 +52,7 @@ def test_the_torque_controller_is_compared_with_the_papers_torque_controller():
 
 
 def test_no_difference_to_another_jump_than_the_papers():
-    higher = JumpConfig(jump_height=0.05)
+    higher = JumpConfig.of(jump_height=0.05)
     assert all(r.difference is None for r in comparison_rows(higher, episode(), episode()))
 
 

@@ -1,6 +1,5 @@
 """The table of trainings, and the picture of their curves."""
 
-import dataclasses
 import json
 import re
 from pathlib import Path
@@ -18,7 +17,7 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import save_policy
 
-CONFIG = dataclasses.replace(TASK, stand_time=0.1)
+CONFIG = TASK.replace(stand_time=0.1)
 SEEDS = range(3000, 3002)
 SHIFTS = {f"velocity-seed{seed}": constant_shift(0.1 * seed, 0.1 * seed) for seed in range(5)} | {
     "velocity-still-seed0": constant_shift(0.0, 0.0)

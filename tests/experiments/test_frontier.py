@@ -48,7 +48,7 @@ class TestStrongest:
 
 @pytest.fixture
 def small(monkeypatch):
-    task = dataclasses.replace(TASK, stand_time=0.1)
+    task = TASK.replace(stand_time=0.1)
     monkeypatch.setattr(shipped, "TASK", task)
     for name, value in {
         "COMMANDS": (0.04, 0.06), "DISPLACEMENTS": (0.1,),

@@ -1,6 +1,5 @@
 """The rivals: a constant shift chosen by reward, and a policy's mean action replayed."""
 
-import dataclasses
 import itertools
 from types import SimpleNamespace
 
@@ -17,7 +16,7 @@ from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy import NetworkPolicy
 
-CONFIG = dataclasses.replace(TASK, stand_time=0.1)
+CONFIG = TASK.replace(stand_time=0.1)
 CONSOLE = Console(quiet=True)
 
 
@@ -83,7 +82,7 @@ def clock():
 
 
 def test_a_plan_replayed_makes_the_same_jump():
-    config = dataclasses.replace(CONFIG, jump_height=0.05)
+    config = CONFIG.replace(jump_height=0.05)
     replay = open_loop(clock(), config, CONSOLE, seeds=range(2))
     (table,) = replay.actions  # of the one command
     times = np.arange(len(table)) / config.agent_frequency
@@ -98,17 +97,17 @@ def test_each_command_has_the_mean_of_its_own_episodes():
     names = ("jump_height", "gyro.y")
     weight = np.array([[0.2, 1.0]], np.float32), np.zeros(1, np.float32)
     policy = NetworkPolicy(names, (weight,), ("vertical",))
-    config = dataclasses.replace(CONFIG, sensors="realistic")
+    config = CONFIG.replace(sensors="realistic")
     replay = open_loop(policy, config, CONSOLE, seeds=range(4))
     for command, table, seeds in zip((0.04, 0.08), replay.actions, ((0, 2), (1, 3)), strict=True):
-        env = make_env(dataclasses.replace(config, jump_height=command))
+        env = make_env(config.replace(jump_height=command))
         firsts = [policy(env.reset(seed=seed)[0])[2] for seed in seeds]
         assert firsts[0] != firsts[1]
         assert table[0, 2] == pytest.approx(np.mean(firsts), abs=1e-6)
 
 
 def test_a_fall_in_the_launch_leaves_the_remaining_steps_zero():
-    config = JumpConfig(jump_height=0.02, residual_scale=(0.1, 0.1, 0.1))
+    config = JumpConfig.of(jump_height=0.02, residual_scale=(0.1, 0.1, 0.1))
     layer = np.zeros((1, 0), np.float32), np.ones(1, np.float32)
     sideways = NetworkPolicy((), (layer,), ("lateral",))
     (table,) = open_loop(sideways, config, CONSOLE, seeds=(0,)).actions

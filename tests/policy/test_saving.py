@@ -99,7 +99,7 @@ def test_a_file_beyond_the_limit_is_refused(path):
 
 
 def test_another_environment_is_refused(path):
-    other = JumpConfig(controller="torque", ankle_shift=False, randomization="full")
+    other = JumpConfig.of(controller="torque", ankle_shift=False, randomization="full")
     load_policy(path)
     with pytest.raises(PolicyMismatchError) as error:
         load_policy(path, other)
@@ -120,7 +120,7 @@ def test_another_layout_is_named_even_if_inputs_are_gone(path):
 def test_replay_at_another_rate_than_the_environments(tmp_path):
     with pytest.raises(ConfigError, match=r"agent_frequency=50\.0 .* 100\.0"):
         save_policy(tmp_path / "a.json", make_replay(frequency=50.0), **DETAILS)
-    details = DETAILS | {"config": JumpConfig(agent_frequency=50.0)}
+    details = DETAILS | {"config": JumpConfig.of(agent_frequency=50.0)}
     save_policy(tmp_path / "a.json", make_replay(frequency=50.0), **details)
     assert load_policy(tmp_path / "a.json").policy.agent_frequency == 50.0
 
