@@ -51,12 +51,14 @@ def test_dependencies_run_one_way(file):
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
-def test_only_the_simulation_knows_mujoco_and_nobody_torch(file):
+def test_only_the_simulation_knows_mujoco_figures_matplotlib_and_nobody_torch(file):
     modules = {name.split(".")[0] for name in imports(file)}
     folder = file.relative_to(PACKAGE).parts[0]
     if folder != "simulation" and file.name != "mujoco_model.py":
         assert "mujoco" not in modules
     assert not modules & {"torch", "stable_baselines3"}
+    if "figures" not in file.parts:
+        assert "matplotlib" not in modules
 
 
 def test_every_module_is_small():

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.progress import TimeRemainingColumn
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tiny_run import ARGUMENTS, SEEDS, children, results, train, written
 
@@ -257,6 +258,20 @@ def test_a_dead_worker_ends_the_run_and_leaves_no_process(monkeypatch, capsys):
     assert children() == before
     assert error(capsys.readouterr().err) == "error: worker 1 died (exit code -9)"
     assert load_latest(RUN, pytest.fail).number == 3
+
+
+def test_no_time_is_promised_that_ignores_evaluations(monkeypatch):
+    shown, display = [], training.progress_display
+
+    def remember(console, *columns):
+        shown.extend(columns)
+        return display(console, *columns)
+
+    monkeypatch.setattr(training, "progress_display", remember)
+    arguments = ("--run", "run", *ARGUMENTS, "--timesteps", "1", "--jobs", "1")
+    assert train(monkeypatch, *arguments) == 0
+    assert shown
+    assert not any(isinstance(column, TimeRemainingColumn) for column in shown)
 
 
 def test_a_robot_that_never_flies_does_not_stop_the_training(monkeypatch):

@@ -40,6 +40,7 @@ def calls(monkeypatch):
     monkeypatch.setattr(evidence, "TEST", range(3000, 3002))
     monkeypatch.setattr(rivals, "FORWARD", (0.0, 0.4))
     monkeypatch.setattr(rivals, "VERTICAL", (0.0,))
+    monkeypatch.setattr(rivals, "_COMMANDS", 2)
     monkeypatch.setattr(rivals.best_constant, "__defaults__", (range(2),))
     monkeypatch.setattr(rivals.open_loop, "__defaults__", (range(2),))
     Path("docs/images").mkdir(parents=True)
