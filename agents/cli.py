@@ -16,8 +16,8 @@ from icub_jump_env.evaluation.output import say
 from icub_jump_env.evaluation.parallel import WorkerError
 
 _REMEDY = (
-    "training needs the extra 'rl': pip install \"icub-jump[rl]\" "
-    "(or stable-baselines3 and tensorboard)"
+    "training needs the extra 'rl', in the repository's folder: "
+    'pip install -c constraints.txt -e ".[rl]"'
 )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import json
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,6 +40,7 @@ from icub_jump_env.evaluation.provenance import SOURCE, command, source, version
 from icub_jump_env.evaluation.rollout import Episode
 from icub_jump_env.evaluation.summary import Summary, by_command, command_range
 from icub_jump_env.evaluation.table import CM, DEG
+from icub_jump_env.files import read_json
 from icub_jump_env.policy import load_policy, save_policy
 from icub_jump_env.policy.fields import check_command
 
@@ -129,7 +129,7 @@ def _claim(options: TrainOptions, console: Console) -> Sequence[str]:
     for flag, value in _flags(options).items():
         if value != recorded[flag]:
             raise ConfigError(flag, value, f"{recorded[flag]!r}, as {file} has it")
-    return check_command(json.loads(file.read_text()).get(COMMAND, command()))
+    return check_command(read_json(file.read_bytes()).get(COMMAND, command()))
 
 
 def other_code(file: Path) -> bool:
@@ -345,7 +345,7 @@ class _Run(BaseCallback):
 def _read_minutes(file: Path, count: int) -> list[float | None]:
     """What the first evaluations took; unknown if the file is gone, for it is a mere report."""
     try:
-        minutes = json.loads(file.read_text())["minutes"]
+        minutes = read_json(file.read_bytes())["minutes"]
         return [None if value is None else float(value) for value in minutes[:count]]
     except (OSError, ValueError, TypeError, KeyError):
         return [None] * count

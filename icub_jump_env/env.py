@@ -199,13 +199,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Advance by ``dt``; less if the episode ends within.
 
         Args:
-            action: (3,) in [-1, 1].
+            action: (3,) in [-1, 1]; what lies beyond is clipped.
 
         Returns:
             Observation, reward, terminated, truncated (always False) and info.
 
         Raises:
-            ActionError: If the action is misshapen, not finite or out of range.
+            ActionError: If the action is misshapen or not finite.
             gymnasium.error.ResetNeeded: Before the first reset.
         """
         if self._outcome == "not reset":

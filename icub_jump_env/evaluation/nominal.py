@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import MissingDependencyError
@@ -108,7 +109,7 @@ def print_nominal(
         launch = plan_com_trajectory(
             config.commanded_height, config.com_displacement, config.com_scaling
         )
-        acting = f" with {contender.name}, after {launch.displacement * 100:.3g} cm"
+        acting = f" with {escape(contender.name)}, after {launch.displacement * 100:.3g} cm"
         show(console, render_table(rows, title + acting + paper, "baseline"))
     for file in wrote:
         say(console, f"wrote {file}")

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from icub_jump_env.errors import ConfigError
+from icub_jump_env.errors import ConfigError, printable
 from icub_jump_env.files import strict_json, write_file
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ def progress_display(console: Console) -> Progress:
 
 
 def say(console: Console, text: str) -> None:
-    """Print a line as it is: not wrapped, and nothing in it taken for markup."""
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    """Print a line: not wrapped, and nothing in it obeyed by the terminal or taken for markup."""
+    console.print(printable(text), soft_wrap=True, markup=False, highlight=False)
 
 
 def show(console: Console, table: Table) -> None:

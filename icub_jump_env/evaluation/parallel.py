@@ -36,7 +36,10 @@ class Job(NamedTuple):
 Work = Sequence[Job]
 Results = Generator[tuple[int, Episode], None, None]
 
-_REMEDY = "several jobs need the extra 'parallel': pip install \"icub-jump[parallel]\" (or ray)"
+_REMEDY = (
+    "several jobs need the extra 'parallel', in the repository's folder: "
+    'pip install -c constraints.txt -e ".[parallel]"'
+)
 
 _RAY_SETTINGS = {
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # on any system: listen on loopback alone

@@ -54,12 +54,13 @@ def run_statistics(
     title, table, lines = render(done, options, contender)
     say(console, title)
     show(console, table)
-    say(console, lines)
+    for line in lines:
+        say(console, line)
 
 
 def render(
     episodes: Sequence[Episode], options: EvalOptions, contender: Contender
-) -> tuple[str, Table, str]:
+) -> tuple[str, Table, list[str]]:
     """What the terminal shows: title, metrics, rates and failures."""
     config, summary = options.config, Summary.of(episodes)
     title = (
@@ -93,7 +94,7 @@ def render(
         if options.policy is not None:
             words += f" --policy {shlex.quote(str(options.policy))}"
         lines.append(f"replay one: python eval.py {words} --view")
-    return title, table, "\n".join(lines)
+    return title, table, lines
 
 
 def replay_arguments(config: JumpConfig, seed: int) -> str:

@@ -331,6 +331,25 @@ class TestNames:
         names = [contender.name for contender in read_contenders(words)]
         assert names == ["baseline", "first-best", "second-best", "last"]
 
+    def test_nothing_in_a_name_reaches_the_terminal(self, capsys, tmp_path):
+        file = save_constant(tmp_path / "red\x1b[31m\n[bold]\x07.safetensors", 0.1, 0, 0)
+        code, out, err = evaluate(capsys, "--policy", file, *SHORT)
+        assert (code, err) == (0, "")
+        assert r"with red\x1b[31m\n[bold]\x07, after" in out
+        assert out.replace("\n", "").isprintable()
+        file.with_suffix(".json").write_text("[]")
+        message = refusal(capsys, "--policy", file)
+        assert r"red\x1b[31m [bold]\x07.json: not a JSON object" in message
+
+    def test_nothing_in_a_card_reaches_the_terminal(self, capsys, tmp_path):
+        file = save_constant(tmp_path / "mine.safetensors", 0.1, 0, 0)
+        card = json.loads(file.with_suffix(".json").read_text())
+        for field, value in (("kind", "\x1b[2J\n"), ("\x1b[2J\n", 3), ("axes", ["\x1b[2J\n"])):
+            file.with_suffix(".json").write_text(json.dumps(card | {field: value}))
+            message = refusal(capsys, "--policy", file)
+            assert message.removesuffix("\n").isprintable()
+            assert "x1b[2J" in message
+
     def test_the_same_policy_by_two_paths_is_refused(self, tmp_path):
         file = save_constant(tmp_path / "mine.safetensors", 0, 0, 0)
         with pytest.raises(ConfigError, match="different names"):

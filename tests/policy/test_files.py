@@ -14,12 +14,8 @@ from safetensors.numpy import save
 
 from icub_jump_env import files as package_files
 from icub_jump_env.errors import ICubJumpError, PolicyFileError
-from icub_jump_env.policy.files import (
-    MAX_CARD_DEPTH,
-    MAX_CARD_SIZE,
-    load_tensors,
-    save_tensors,
-)
+from icub_jump_env.files import MAX_DEPTH
+from icub_jump_env.policy.files import MAX_CARD_SIZE, load_tensors, save_tensors
 
 TENSORS = {
     "weights": np.arange(6, dtype=np.float32).reshape(2, 3),
@@ -111,7 +107,7 @@ def test_truncated_anywhere(path):
     text = card.read_bytes()
     for length in (0, 1, len(text) // 2, len(text) - 2):
         card.write_bytes(text[:length])
-        assert refused(path, "not JSON").path == str(card)
+        assert refused(path, "not readable as JSON").path == str(card)
 
 
 def test_any_flipped_bit(path):
@@ -146,11 +142,11 @@ def test_a_card_with_another_hash_or_none(path, digest):
     [
         (b"[1, 2]", "not a JSON object"),
         (b"null", "not a JSON object"),
-        (b"{'a': 1}", "not JSON"),
-        (b'{"a": "\xff"}', "not JSON"),
-        (b'{"a": ' + b"9" * 10_000 + b"}", "not JSON"),
-        (b"[" * 100_000 + b"]" * 100_000, "not JSON"),
-        (b'{"a": ' + b"[" * MAX_CARD_DEPTH + b"]" * MAX_CARD_DEPTH + b"}", "nested more than"),
+        (b"{'a': 1}", "not readable as JSON"),
+        (b'{"a": "\xff"}', "not readable as JSON"),
+        (b'{"a": ' + b"9" * 10_000 + b"}", "not readable as JSON"),
+        (b"[" * 100_000 + b"]" * 100_000, "nested more than 32 deep"),
+        (b'{"a": ' + b"[" * MAX_DEPTH + b"]" * MAX_DEPTH + b"}", "nested more than"),
         (b'{"a": "' + b"x" * MAX_CARD_SIZE + b'"}', "larger than 1048576 bytes"),
     ],
 )
@@ -161,7 +157,7 @@ def test_cards_that_are_something_else(path, text, match):
 
 def test_the_deepest_card_can_be_read(path):
     deep = []
-    for _ in range(MAX_CARD_DEPTH - 2):
+    for _ in range(MAX_DEPTH - 2):
         deep = [deep]
     save_tensors(path, TENSORS, {"deep": deep})
     assert load_tensors(path)[1]["deep"] == deep
