@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-
 MAX_DEPTH = 32
 """Most lists and mappings inside one another in JSON that is read."""
 
