@@ -40,6 +40,25 @@ class TestDivergence:
         assert terminated
         assert info["diverged"]
 
+    @pytest.mark.parametrize("copied", [False, True])
+    def test_leaves_no_file_and_prints_nothing(self, capfd, tmp_path, copied):
+        import mujoco
+
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env.reset(seed=0)
+        if copied:  # as a worker process gets it, which has yet to build a world
+            log = mujoco.MjLogConfig.get()
+            log.logto_console = log.logto_file = True
+            log.set()
+            env = pickle.loads(pickle.dumps(env))
+        env.data.qvel[12] = np.nan
+        assert env.step(ZERO)[4]["diverged"]
+        env.data.qvel[12] = np.nan
+        mujoco.mj_step(env.model, env.data)
+        assert env.data.warning.number.any()
+        assert capfd.readouterr() == ("", "")
+        assert list(tmp_path.iterdir()) == []
+
     def test_step_before_reset_is_refused(self):
         env = gymnasium.make("ICubJump-v0").unwrapped
         with pytest.raises(gymnasium.error.ResetNeeded):
