@@ -6,7 +6,6 @@ from typing import Literal, Protocol
 
 import daqp
 import numpy as np
-import osqp
 import scipy.sparse as sp
 
 from icub_jump_env.control.qp import (
@@ -78,6 +77,8 @@ class OSQPSolver:
     _RHO = 1.0
 
     def __init__(self, problem: QuadraticProgram) -> None:
+        import osqp  # takes long, and the default solver needs none of it
+
         self._problem = problem
         n, m = problem.n, problem.C.shape[0]
         # OSQP wants the upper triangle, column by column, with a fixed pattern.
