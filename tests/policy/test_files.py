@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import pickle
+import stat
 import zipfile
 from pathlib import Path
 
@@ -242,6 +243,40 @@ def test_what_could_not_be_read_back_is_not_written(path, tensors, card, match):
     with pytest.raises(PolicyFileError, match=match):
         save_tensors(path, tensors, card)
     assert contents(path.parent) == before
+
+
+def test_names_reach_the_disk_one_after_the_other(tmp_path, monkeypatch):
+    """A folder is synced after each rename, so that a power cut keeps their order."""
+    calls, replace, sync = [], Path.replace, os.fsync
+
+    def watched_replace(self, target):
+        calls.append(target.name)
+        return replace(self, target)
+
+    def watched_sync(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            calls.append(os.fstat(descriptor).st_ino)
+        sync(descriptor)
+
+    monkeypatch.setattr(Path, "replace", watched_replace)
+    monkeypatch.setattr(os, "fsync", watched_sync)
+    (tmp_path / "b").mkdir()
+    package_files.write_files({tmp_path / "first": b"1", tmp_path / "b" / "second": b"2"})
+    folders = [tmp_path.stat().st_ino, (tmp_path / "b").stat().st_ino]
+    assert calls == ["first", folders[0], "second", folders[1]]
+
+
+def test_a_folder_that_cannot_be_synced_is_no_error(tmp_path, monkeypatch):
+    sync = os.fsync
+
+    def refuse(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "Invalid argument")
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    package_files.write_file(tmp_path / "file", b"1")
+    assert (tmp_path / "file").read_bytes() == b"1"
 
 
 @pytest.mark.parametrize("failing", [0, 1])
