@@ -180,8 +180,17 @@ def read_options(path: Path) -> TrainOptions:
     """Options from a file; what it does not say is as by default.
 
     Raises:
-        ConfigError: If it is not a file of options, or a value is out of range.
+        ConfigError: If it is not a file of options, or a value is out of range; names the file.
     """
+    try:
+        return _from_file(path)
+    except ConfigError as error:
+        if error.value == str(path):
+            raise
+        raise type(error)(error.field, error.value, f"{error.allowed}, in {path}") from None
+
+
+def _from_file(path: Path) -> TrainOptions:
     try:
         if path.exists() and not path.is_file():
             raise OSError("it is none")

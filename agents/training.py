@@ -22,6 +22,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from agents.checkpoints import (
     Checkpoint,
+    CheckpointError,
     begin_segment,
     load_latest,
     restore,
@@ -34,6 +35,7 @@ from agents.ppo import export, freeze_policy, make_model, set_noise
 from agents.run_folder import lock_run
 from agents.seeds import SELECTION
 from agents.workers import JumpVecEnv
+from icub_jump_env.checks import check_count, check_number, check_type
 from icub_jump_env.errors import ConfigError, PolicyFileError
 from icub_jump_env.evaluation.output import progress_display, say, write_json
 from icub_jump_env.evaluation.provenance import SOURCE, command, source, versions
@@ -53,6 +55,9 @@ LAST = "last.safetensors"
 
 MOST_CHECKPOINTS = 500
 """Of a run; the learning curve is in each of them, whose size is limited."""
+
+_LARGEST_SCORE = 1e6
+"""No mean reward comes near it."""
 
 _PACKAGES = ("stable-baselines3", "torch")
 
@@ -214,7 +219,7 @@ class _Run(BaseCallback):
     def resume(self, number: int, progress: Mapping[str, Any]) -> None:
         """Take up what a checkpoint noted."""
         self._number, self._resumed = number, True
-        self._updates, self._curve = progress["updates"], progress["curve"]
+        self._updates, self._curve = _check_progress(number, progress)
         self._minutes = _read_minutes(self._options.folder / CURVE, len(self._curve))
         seed, jobs = self._options.seed, self._options.jobs
         self._seeds = [segment_seeds(seed, earlier, jobs) for earlier in range(1, number)]
@@ -340,6 +345,25 @@ class _Run(BaseCallback):
             seed=self._options.seed,
             results={"evaluation": self._curve[-1]},
         )
+
+
+def _check_progress(number: int, progress: Mapping[str, Any]) -> tuple[int, list[dict[str, Any]]]:
+    """Updates and learning curve, as a checkpoint noted them.
+
+    Raises:
+        CheckpointError: If it did not.
+    """
+    try:
+        updates = check_count("updates", progress.get("updates"), 0, unit="updates")
+        curve = progress.get("curve")
+        if not isinstance(curve, list) or len(curve) != number:
+            raise ConfigError("curve", curve, f"a list of {number} evaluations")
+        for point in curve:
+            check_type("point of the curve", point, dict)
+            check_number("score", point.get("score"), -_LARGEST_SCORE, _LARGEST_SCORE)
+    except ConfigError as error:
+        raise CheckpointError(f"checkpoint {number}: {error}") from None
+    return updates, curve
 
 
 def _read_minutes(file: Path, count: int) -> list[float | None]:
