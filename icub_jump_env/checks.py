@@ -95,7 +95,8 @@ def check_action(action: Any) -> NDArray[np.float64]:
     numbers = array.dtype.kind in "fiu"
     if not numbers or array.shape != (3,) or not np.isfinite(array).all():
         raise ActionError("action", action, allowed)
-    return np.clip(array, -1.0, 1.0).astype(np.float64)
+    clipped: NDArray[np.float64] = np.clip(array, -1.0, 1.0).astype(np.float64)
+    return clipped
 
 
 def is_multiple(value: float, unit: float) -> bool:
