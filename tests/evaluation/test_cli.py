@@ -314,6 +314,13 @@ def test_paths_are_not_taken_for_markup(capsys, tmp_path):
     assert f"wrote {report}\n" in out
 
 
+def test_what_is_said_is_one_line_without_orders_for_the_terminal(capsys, tmp_path):
+    report = tmp_path / "a\x1b[31m\nb.json"
+    code, out, err = evaluate(capsys, "--stand-time", "0.1", "--json", str(report))
+    assert (code, err) == (0, "")
+    assert rf"wrote {tmp_path}/a\x1b[31m\nb.json" in out.splitlines()
+
+
 def test_json_is_written_though_nobody_reads_the_table(tmp_path):
     command = [sys.executable, str(REPOSITORY / "eval.py"), "--stand-time", "0.1", "--json", "j"]
     with subprocess.Popen(
