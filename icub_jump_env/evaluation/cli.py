@@ -224,7 +224,8 @@ def _one_line(complaint: str) -> str:
     # tyro says so where a dataclass itself refused; the user knows no dataclass.
     text = re.sub(r"^Error parsing \w*Options: ", "", " ".join(message)) or "bad arguments"
     if text.startswith("Unrecognized options"):
-        similar = dict.fromkeys(re.findall(r"^│ {5}(--[\w.-]+)", complaint, re.MULTILINE))
+        # Sorted: tyro has them in any order.
+        similar = sorted(set(re.findall(r"^│ {5}(--[\w.-]+)", complaint, re.MULTILINE)))
         if similar:
             text += f"; did you mean {' or '.join(similar)}?"
     return text

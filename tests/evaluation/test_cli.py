@@ -271,7 +271,7 @@ def test_refusals_are_one_plain_line_in_a_terminal():
     [
         (["--jump-hight", "0.05"], "--jump-hight, 0.05; did you mean --jump-height?"),
         (["--sweepp"], "--sweepp; did you mean --sweep?"),
-        (["--sede", "1", "--solvr", "osqp"], "osqp; did you mean --solver or --seed?"),
+        (["--sede", "1", "--solvr", "osqp"], "osqp; did you mean --seed or --solver?"),
         (["--wings", "2"], "--wings, 2"),
     ],
 )

@@ -294,4 +294,4 @@ class TestCommand:
         monkeypatch.setattr(compare, "run_contenders", lambda *_: pytest.fail("should not jump"))
         code, _, err = evaluate(capsys, *asked, "--jobs", "2")
         assert code == 2
-        assert "icub-jump[parallel]" in err
+        assert '-e ".[parallel]"' in err

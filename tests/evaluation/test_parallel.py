@@ -65,7 +65,7 @@ def test_no_work_starts_nothing(monkeypatch):
 
 def test_missing_ray_is_named_at_once(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(MissingDependencyError, match=r"icub-jump\[parallel\]"):
+    with pytest.raises(MissingDependencyError, match=r'-e "\.\[parallel\]"'):
         run_jobs(episodes(JUMP, 2), jobs=2)
 
 
