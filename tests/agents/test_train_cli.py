@@ -169,7 +169,7 @@ def test_a_damaged_record_of_the_options_is_refused(refused, run):
 
 def test_a_missing_package_is_named_with_its_remedy(refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "agents.training", None)
-    assert 'pip install "icub-jump[rl]"' in refused()
+    assert 'pip install -c constraints.txt -e ".[rl]"' in refused()
 
 
 class Bomb:
