@@ -102,9 +102,10 @@ class VelocityController:
         Returns:
             (n,) joint velocities (rad/s) within the limits.
         """
-        error = state.angular_momentum - setpoint.angular_momentum
-        error *= self._dt
-        self._integral += error
+        momentum = state.angular_momentum
+        if setpoint.angular_momentum is not None:
+            momentum = momentum - setpoint.angular_momentum
+        self._integral += momentum * self._dt
         qp = self.qp
         solution, self.report = qp.solve(state, setpoint)
         solved = not self.report.failed
