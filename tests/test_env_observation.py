@@ -60,7 +60,7 @@ def test_observation_against_the_simulator_in_mid_launch():
     for _ in range(30):
         obs, *_ = env.step(np.array([0.1, -0.1, 0.1], np.float32))
     block, data, now = decoded(obs), env.data, env.snapshot()
-    crouch = env._crouch
+    crouch = env.robot.crouch
     assert block["time"] == pytest.approx(0.30)
     duration = block["takeoff_time"]
     assert duration == pytest.approx(0.11 / (0.28867 * math.sqrt(2 * 9.81 * 0.05)), rel=1e-3)

@@ -218,7 +218,7 @@ class TestEffects:
             ranges = Randomization(joint_gain=(gain, gain), payload_mass=(3.0, 3.0))
             env = make_env(JumpConfig(randomization=ranges))
             env.reset(seed=0)
-            errors.append(np.abs(env.data.qpos[7:] - env._crouch).max())
+            errors.append(np.abs(env.data.qpos[7:] - env.robot.crouch).max())
         assert errors[0] > 1.3 * errors[1]
 
     def test_friction_acts_in_full_while_a_motor_brakes_at_its_limit(self):
@@ -238,7 +238,7 @@ class TestEffects:
         env = make_env(JumpConfig(randomization=Randomization(slope=(slope, slope))))
         env.reset(seed=0)
         base_pitch = env.snapshot().base_pitch
-        gravity = env._simulation.sensors.gravity
+        gravity = env._simulation.sensors.readings.gravity
         # Uphill: gravity points backward in a frame that leans with the floor.
         assert np.arctan2(gravity[0], -gravity[2]) == pytest.approx(base_pitch - slope, abs=1e-6)
 

@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from icub_jump_env.errors import ConfigError
@@ -73,6 +73,7 @@ def recorded(speed=0.886, stand_time=0.3, **values):
     return recorder
 
 
+@settings(max_examples=10)
 @given(st.floats(0.2, 2.0))
 def test_parabola(speed):
     metrics = recorded(speed).metrics
