@@ -172,8 +172,8 @@ class TestConfiguration:
             assert words in refusal.value.allowed
 
     def test_ragged_lists_are_refused_in_other_fields_as_well(self):
-        with pytest.raises(ConfigError, match="residual_scale"):
-            JumpConfig(residual_scale=[[1], [1, 2], 3])
+        with pytest.raises(ConfigError, match=r"residual\.scale"):
+            JumpConfig().replace(residual_scale=[[1], [1, 2], 3])
         with pytest.raises(ConfigError, match="friction"):
             JumpConfig(randomization={"friction": [[1], [1, 2]]})
 

@@ -53,8 +53,10 @@ def test_the_posture_follows_the_residual_to_the_shift_of_the_com():
     env = make_env(JumpConfig().replace(residual_phases="all"))
     env.reset(seed=0)
     controller, state = env._controller, env._state
-    state.foot_force = np.full(2, 150.0)
-    controller.phases.phase = Phase.LANDING
+    for tick, force in enumerate((0.0, 0.0, 150.0)):
+        state.foot_force = np.full(2, force)
+        controller.tick(state, 0.005 * tick, np.zeros(3))
+    assert controller.phases.phase is Phase.LANDING
     commands = []
     for target in (np.zeros(3), np.array([0.01, 0.004, -0.01])):
         for count in range(400):
