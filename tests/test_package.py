@@ -18,7 +18,7 @@ LAYERS = (
     ("policy",),
     ("reward", "config", "observation", "snapshot"),
     ("control", "simulation"),
-    ("estimation", "reference", "metrics"),
+    ("estimation", "planning", "metrics"),
     ("robot",),
     ("checks", "files"),
     ("errors",),

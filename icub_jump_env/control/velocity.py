@@ -106,16 +106,14 @@ class VelocityController:
         if setpoint.angular_momentum is not None:
             momentum = momentum - setpoint.angular_momentum
         self._integral += momentum * self._dt
-        qp = self.qp
-        solution, self.report = qp.solve(state, setpoint)
+        solution, self.report = self.qp.solve(state, setpoint)
         solved = not self.report.failed
         if not solved and self._fallback is not None:
-            qp = self._fallback
-            solution, report = qp.solve(state, setpoint)
+            solution, report = self._fallback.solve(state, setpoint)
             solved = not report.failed
         # Keeping on is the best guess when the solver has none. The limits take the
         # last rounding error off a solution; fmin and fmax pass over NaN limits.
-        command, problem = self._previous, qp.problem
+        command, problem = self._previous, self.qp.problem
         if solved:
             command[:] = solution.x
         np.fmin(command, problem.upper[: problem.n], out=command)
