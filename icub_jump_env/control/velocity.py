@@ -102,10 +102,9 @@ class VelocityController:
         Returns:
             (n,) joint velocities (rad/s) within the limits.
         """
-        momentum = state.angular_momentum
-        if setpoint.angular_momentum is not None:
-            momentum = momentum - setpoint.angular_momentum
-        self._integral += momentum * self._dt
+        error = state.angular_momentum - setpoint.angular_momentum
+        error *= self._dt
+        self._integral += error
         solution, self.report = self.qp.solve(state, setpoint)
         solved = not self.report.failed
         if not solved and self._fallback is not None:

@@ -20,26 +20,35 @@ class Setpoint:
             the controllers in the world.
         com_velocity: (3,) m/s.
         com_acceleration: (3,) m/s^2.
-        posture: (n,) s_d (rad).
-        posture_velocity: (n,) rad/s; None means zero, here and below.
-        posture_acceleration: (n,) rad/s^2.
         angular_momentum: (3,) centroidal angular momentum (kg m^2/s).
         angular_momentum_rate: (3,) its derivative (Nm).
+        posture: (n,) s_d (rad).
+        posture_velocity: (n,) rad/s.
+        posture_acceleration: (n,) rad/s^2.
     """
 
     com_position: Array
     com_velocity: Array
     com_acceleration: Array
+    angular_momentum: Array
+    angular_momentum_rate: Array
     posture: Array
-    posture_velocity: Array | None = None
-    posture_acceleration: Array | None = None
-    angular_momentum: Array | None = None
-    angular_momentum_rate: Array | None = None
+    posture_velocity: Array
+    posture_acceleration: Array
 
     @classmethod
     def at_rest(cls, posture: Array) -> Setpoint:
         """Rest in a posture ((n,) rad) with the CoM at the origin."""
-        return cls(np.zeros(3), np.zeros(3), np.zeros(3), posture.copy())
+        return cls(
+            com_position=np.zeros(3),
+            com_velocity=np.zeros(3),
+            com_acceleration=np.zeros(3),
+            angular_momentum=np.zeros(3),
+            angular_momentum_rate=np.zeros(3),
+            posture=posture.copy(),
+            posture_velocity=np.zeros_like(posture),
+            posture_acceleration=np.zeros_like(posture),
+        )
 
 
 class JumpPlan(Protocol):

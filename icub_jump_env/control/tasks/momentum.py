@@ -36,8 +36,7 @@ class MomentumIntegral:
         """Write the equation."""
         np.multiply(self._kinematics.J_momentum, self.scale, out=rows)
         np.multiply(self._integral, -self._gain, out=target)
-        if setpoint.angular_momentum is not None:
-            target += setpoint.angular_momentum
+        target += setpoint.angular_momentum
         target *= self.scale
 
 
@@ -57,10 +56,7 @@ class MomentumRate:
     def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
         """Write the equation."""
         np.multiply(self._dynamics.moment_rows, self.scale, out=rows[:, -12:])
-        error = state.angular_momentum
-        if setpoint.angular_momentum is not None:
-            error = error - setpoint.angular_momentum
-        np.dot(error, state.base_rotation, out=target)
-        target *= -self.scale * self._gain
-        if setpoint.angular_momentum_rate is not None:
-            target += setpoint.angular_momentum_rate.dot(state.base_rotation) * self.scale
+        wanted = setpoint.angular_momentum - state.angular_momentum
+        np.dot(wanted, state.base_rotation, out=target)
+        target *= self.scale * self._gain
+        target += np.dot(setpoint.angular_momentum_rate, state.base_rotation) * self.scale

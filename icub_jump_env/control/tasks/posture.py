@@ -28,8 +28,7 @@ class PostureVelocity:
         """Subtract Lambda s_dot* from the gradient."""
         gradient += self._pull * state.joint_position
         gradient -= self._pull * setpoint.posture
-        if setpoint.posture_velocity is not None:
-            gradient -= self.diagonal * setpoint.posture_velocity
+        gradient -= self.diagonal * setpoint.posture_velocity
 
 
 class PostureAcceleration:
@@ -57,11 +56,9 @@ class PostureAcceleration:
         """Subtract Lambda s_ddot* from the gradient."""
         wanted = setpoint.posture - state.joint_position
         wanted *= self._stiffness
-        velocity = state.joint_velocity
-        if setpoint.posture_velocity is not None:
-            velocity = velocity - setpoint.posture_velocity
-        wanted -= self._damping * velocity
-        if setpoint.posture_acceleration is not None:
-            wanted += setpoint.posture_acceleration
+        error = state.joint_velocity - setpoint.posture_velocity
+        error *= self._damping
+        wanted -= error
+        wanted += setpoint.posture_acceleration
         wanted *= self._weight
         gradient[: self._n] -= wanted
