@@ -102,7 +102,7 @@ def test_a_file_holds_where_the_command_line_says_nothing(asked, run):
     file = Path("run/options.json")
     config = dataclasses.replace(run, config=file)
     assert asked("--config", str(file)) == config
-    assert asked(f"--config={file}", "--seed", "6") == config.replace(seed=6)
+    assert asked(f"--config={file}", "--seed", "6") == dataclasses.replace(config, seed=6)
     # What fits together depends on the file: by default there are 64 episodes and 8 jobs.
     assert asked("--config", str(file), "--jobs", "2").jobs == 2
     assert asked("--config", str(file), "--ppo.episodes", "9").ppo.episodes == 9
@@ -169,7 +169,7 @@ def test_a_damaged_record_of_the_options_is_refused(refused, run):
 
 def test_a_missing_package_is_named_with_its_remedy(refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "agents.training", None)
-    assert 'pip install "icub-jump[rl]"' in refused()
+    assert 'pip install -c constraints.txt -e ".[rl]"' in refused()
 
 
 class Bomb:
