@@ -11,12 +11,13 @@ fenced block that shows its output:
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 DOCS = Path(__file__).parent
@@ -50,8 +51,10 @@ def fresh(block: re.Match[str], output: Callable[[str], str] = output_of) -> str
     return f"<!-- {command} -->\n{shown}\n"
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Update README.md and all documents, each block as soon as its command has run."""
+    raw = argparse.RawDescriptionHelpFormatter
+    argparse.ArgumentParser(description=__doc__, formatter_class=raw).parse_args(arguments)
     for file in (REPOSITORY / "README.md", *sorted(DOCS.glob("*.md"))):
         for block in BLOCK.finditer(file.read_text()):
             print(f"{file.relative_to(REPOSITORY)}: {block['command']}")

@@ -86,8 +86,8 @@ class RenderConfig:
 
     def __post_init__(self) -> None:
         check_choice("render_mode", self.mode, (None, *get_args(RenderMode)))
-        store(self, width=check_count("width", self.width, 16, 1920))
-        store(self, height=check_count("height", self.height, 16, 1080))
+        store(self, width=check_count("width", self.width, 16, 1920, "pixels"))
+        store(self, height=check_count("height", self.height, 16, 1080, "pixels"))
         check_choice("camera", self.camera, get_args(CameraName))
 
 
@@ -210,11 +210,14 @@ class JumpConfig:
         store(self, jump_height=_check_heights(self.jump_height))
         if self.com_displacement is not None:
             displacement = check_number(
-                "com_displacement", self.com_displacement, *DISPLACEMENT_RANGE
+                "com_displacement", self.com_displacement, *DISPLACEMENT_RANGE, "m"
             )
             store(self, com_displacement=displacement)
-        store(self, timestep=check_number("timestep", self.timestep, *TIMESTEP_RANGE))
-        store(self, command_delay=check_count("command_delay", self.command_delay, 0, MAX_DELAY))
+        store(self, timestep=check_number("timestep", self.timestep, *TIMESTEP_RANGE, "s"))
+        store(
+            self,
+            command_delay=check_count("command_delay", self.command_delay, 0, MAX_DELAY, "ticks"),
+        )
         self._check_groups()
         self._check_rates()
         for height in self.jump_heights:
@@ -259,7 +262,7 @@ class JumpConfig:
             raise ConfigError(
                 "control_frequency", control, f"a divisor of the physics rate of {physics:g} Hz"
             )
-        agent = check_number("agent_frequency", self.agent_frequency, *AGENT_FREQUENCY_RANGE)
+        agent = check_number("agent_frequency", self.agent_frequency, *AGENT_FREQUENCY_RANGE, "Hz")
         if not is_multiple(control, agent):
             raise ConfigError(
                 "agent_frequency", agent, f"a divisor of the control rate of {control:g} Hz"
@@ -427,8 +430,8 @@ def _set(group: Any, path: list[str], value: Any) -> Any:
 
 def _check_heights(heights: Any) -> float | tuple[float, float]:
     if isinstance(heights, list | tuple | np.ndarray):
-        return check_range("jump_height", heights, *JUMP_HEIGHT_RANGE)
-    return check_number("jump_height", heights, *JUMP_HEIGHT_RANGE)
+        return check_range("jump_height", heights, *JUMP_HEIGHT_RANGE, "m")
+    return check_number("jump_height", heights, *JUMP_HEIGHT_RANGE, "m")
 
 
 def _from_mapping(name: str, values: Mapping[str, Any], kind: type[T]) -> T:

@@ -197,7 +197,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Advance by ``dt``; less if the episode ends within.
 
         Args:
-            action: (3,), clipped to [-1, 1].
+            action: (3,) in [-1, 1]; what lies beyond is clipped.
 
         Returns:
             Observation, reward, terminated, truncated (always False) and info.

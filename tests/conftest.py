@@ -39,7 +39,7 @@ def quiet() -> Console:
 
 @pytest.fixture(autouse=True)
 def in_temporary_folder(tmp_path, monkeypatch):
-    """MuJoCo writes MUJOCO_LOG.TXT into the working folder when a simulation diverges."""
+    """Evaluations keep their episodes in the working folder."""
     monkeypatch.chdir(tmp_path)
 
 

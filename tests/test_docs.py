@@ -74,6 +74,27 @@ def test_the_readme_shows_the_table_once():
     assert readme.count("flight height (CoM), cm") == 1
 
 
+def test_help_runs_no_command(capsys, monkeypatch):
+    monkeypatch.setattr(update, "fresh", pytest.fail)
+    with pytest.raises(SystemExit) as end:
+        update.main(["--help"])
+    assert end.value.code == 0
+    assert "python docs/update.py" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as end:
+        update.main(["--hepl"])
+    assert end.value.code == 2
+
+
+def test_nothing_advises_to_install_the_package_from_an_index():
+    sources = [
+        file
+        for folder in ("icub_jump_env", "agents")
+        for file in (REPOSITORY / folder).rglob("*.py")
+    ]
+    for file in (*sources, *DOCUMENTS):
+        assert not re.search(r"pip install [^\n`]*icub-jump\b(?!-)", file.read_text()), file
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
 def test_every_command_of_eval_parses(document):
     text = document.read_text().replace("\\\n", " ")  # a command may go on in the next line

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import ZERO, rollout
 
-from icub_jump_env.errors import ActionError, ConfigError, ICubJumpError
+from icub_jump_env.errors import ActionError, ConfigError, ICubJumpError, shown
 
 
 class TestDivergence:
@@ -39,6 +39,25 @@ class TestDivergence:
         *_, terminated, _, info = env.step(ZERO)
         assert terminated
         assert info["diverged"]
+
+    @pytest.mark.parametrize("copied", [False, True])
+    def test_leaves_no_file_and_prints_nothing(self, capfd, tmp_path, copied):
+        import mujoco
+
+        env = gymnasium.make("ICubJump-v0").unwrapped
+        env.reset(seed=0)
+        if copied:  # as a worker process gets it, which has yet to build a world
+            log = mujoco.MjLogConfig.get()
+            log.logto_console = log.logto_file = True
+            log.set()
+            env = pickle.loads(pickle.dumps(env))
+        env.data.qvel[12] = np.nan
+        assert env.step(ZERO)[4]["diverged"]
+        env.data.qvel[12] = np.nan
+        mujoco.mj_step(env.model, env.data)
+        assert env.data.warning.number.any()
+        assert capfd.readouterr() == ("", "")
+        assert list(tmp_path.iterdir()) == []
 
     def test_step_before_reset_is_refused(self):
         env = gymnasium.make("ICubJump-v0").unwrapped
@@ -77,7 +96,7 @@ class TestBadInput:
         with pytest.raises(ConfigError) as refusal:
             gymnasium.make("ICubJump-v0", **{field: value})
         assert refusal.value.field.startswith(field)
-        assert repr(value) in str(refusal.value)
+        assert shown(value) in str(refusal.value)
         assert refusal.value.allowed
         assert isinstance(refusal.value, ICubJumpError)
         assert isinstance(refusal.value, ValueError)
@@ -124,7 +143,7 @@ class TestBadInput:
     @pytest.mark.parametrize(
         "action",
         [
-            np.full(3, np.nan), np.full(3, np.inf), np.full(3, 1.01), np.zeros(2),
+            np.full(3, np.nan), np.full(3, np.inf), [0, 0, -np.inf], [0.5, 2, np.nan], np.zeros(2),
             np.zeros((3, 1)), ["0", "0", "0"], np.zeros(3, complex), np.zeros(3, bool), 0.0,
             [0, 0, 10**400], None, "jump", [1, 2], ["a", "b", "c"], [[0, 0], [0]],
         ],
@@ -137,6 +156,16 @@ class TestBadInput:
             env.step(action)
         assert refusal.value.field == "action"
         np.testing.assert_array_equal(env.unwrapped.data.qpos, before)
+
+    @pytest.mark.parametrize("beyond", [[1.01, -3, 0.5], np.array([2, -2, 0.5]), [1e300, -7, 0.5]])
+    def test_actions_beyond_one_are_clipped(self, env, beyond):
+        steps = []
+        for action in (beyond, [1, -1, 0.5]):
+            env.reset(seed=0)
+            steps.append(env.unwrapped.step(action))
+        (observation, *beyond_result), (expected, *clipped_result) = steps
+        np.testing.assert_array_equal(observation, expected)
+        assert beyond_result == clipped_result
 
     def test_errors_survive_pickling(self):
         for kind in (ActionError, ConfigError):

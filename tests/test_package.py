@@ -87,6 +87,18 @@ def test_importing_registers_and_loads_nothing_heavy():
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
+def test_the_default_environment_loads_no_osqp():
+    program = (
+        "import sys, gymnasium, icub_jump_env\n"
+        "assert not {'osqp', 'joblib'} & set(sys.modules)\n"
+        "gymnasium.make('ICubJump-v0').reset(seed=0)\n"
+        "assert not {'osqp', 'joblib'} & set(sys.modules)\n"
+        "gymnasium.make('ICubJump-v0', solver='osqp')\n"
+        "assert 'osqp' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")

@@ -44,9 +44,12 @@ class ResidualConfig:
     bandwidth: float = 15.0
 
     def __post_init__(self) -> None:
-        store(self, scale=check_numbers("residual.scale", self.scale, 3, *RESIDUAL_RANGE))
+        store(self, scale=check_numbers("residual.scale", self.scale, 3, *RESIDUAL_RANGE, "m"))
         check_choice("residual.phases", self.phases, get_args(ResidualPhases))
-        store(self, bandwidth=check_number("residual.bandwidth", self.bandwidth, 1.0, 1000.0))
+        store(
+            self,
+            bandwidth=check_number("residual.bandwidth", self.bandwidth, 1.0, 1000.0, "rad/s"),
+        )
 
 
 class ResidualFilter:

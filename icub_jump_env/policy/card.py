@@ -99,7 +99,9 @@ class PolicyCard:
             inputs=check_inputs(self.inputs, dict(observation)),
             hidden=check_hidden(self.hidden),
             axes=check_axes(self.axes),
-            action_scale=check_number("action_scale", self.action_scale, *ACTION_SCALE_RANGE),
+            action_scale=check_number(
+                "action_scale", self.action_scale, *ACTION_SCALE_RANGE, "of the largest action"
+            ),
             config=_check_config(self.config),
             versions=check_versions(self.versions),
             command=check_command(self.command),

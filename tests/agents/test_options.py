@@ -56,6 +56,7 @@ def test_another_file_is_refused(tmp_path, content):
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(ConfigError) as refusal:
         read_options(file)
+    assert str(file) in str(refusal.value)
     assert message in str(refusal.value).replace(f"{tmp_path}/", "")
 
 

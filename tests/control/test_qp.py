@@ -95,3 +95,27 @@ def test_infeasible_problems_are_not_solved(name):
     problem.C[-1] = problem.C[-2]
     problem.lower[-1] = problem.upper[-1] = problem.upper[-2] + 1.0
     assert make_solver(name, problem).solve().status is not QPStatus.SOLVED
+
+
+def poisoned(field, value):
+    problem = random_problem(3)
+    getattr(problem, field).flat[0] = value
+    return problem
+
+
+@pytest.mark.parametrize("built_before", [True, False])
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [*((field, np.nan) for field in ("H", "g", "C", "lower", "upper")),
+     ("H", np.inf), ("g", np.inf), ("C", -np.inf), ("H", -1e6), ("lower", 5.0)],
+)  # fmt: skip
+def test_a_problem_without_solution_prints_nothing(capfd, field, value, built_before):
+    """OSQP complains on stdout even if told to be silent."""
+    poison = poisoned(field, value)
+    problem = random_problem(3)
+    solver = make_solver("osqp", problem if built_before else poison)
+    if built_before:
+        for name in ("H", "g", "C", "lower", "upper"):
+            getattr(problem, name)[:] = getattr(poison, name)
+    assert solver.solve().status is not QPStatus.SOLVED
+    assert capfd.readouterr() == ("", "")

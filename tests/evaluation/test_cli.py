@@ -292,12 +292,59 @@ def test_refusals_are_one_plain_line_in_a_terminal():
     assert result.stderr == "error: Unrecognized options: --wings, 2\n"
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["--jump-hight", "0.05"], "--jump-hight, 0.05; did you mean --jump-height?"),
+        (["--sweepp"], "--sweepp; did you mean --sweep?"),
+        (["--sede", "1", "--solvr", "osqp"], "osqp; did you mean --seed or --solver?"),
+        (["--wings", "2"], "--wings, 2"),
+    ],
+)
+def test_a_misspelt_flag_is_told_the_nearest(capsys, words, meant):
+    code, out, err = evaluate(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: Unrecognized options: ")
+    assert err.endswith(f"{meant}\n")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--actuators", "[" * 100_000),
+        ("--sensors", "[" * 900 + "]" * 900),
+        ("--sensors", '{"tilt": ' + "[" * 900 + "]" * 900 + "}"),
+        ("--actuators", '{"motor": ' * 200 + "1" + "}" * 200),
+        ("--sensors", '{"delay": 1' + "0" * 100_000 + "}"),
+        ("--actuators", "\x1b[31m\x07"),
+        ("--actuators", json.dumps({"\x1b[31m\n": "\x1b"})),
+        ("--jump-height", "\x1b[31m\n"),
+        ("--\x1b[31m",),
+    ],
+    ids=range(9),
+)
+def test_whatever_is_given_the_refusal_is_one_printable_line(capsys, words):
+    code, out, err = evaluate(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.removesuffix("\n").isprintable()
+    assert len(err) <= 2100
+
+
 def test_paths_are_not_taken_for_markup(capsys, tmp_path):
     report = tmp_path / "[red]r[" / "q[b].json"
     report.parent.mkdir()
     code, _, err = evaluate(capsys, "--stand-time", "0.1", "--json", str(report))
     assert code == 0
     assert f"wrote {report}\n" in err
+
+
+def test_what_is_said_is_one_line_without_orders_for_the_terminal(capsys, tmp_path):
+    report = tmp_path / "a\x1b[31m\nb.json"
+    code, out, err = evaluate(capsys, "--stand-time", "0.1", "--json", str(report))
+    assert (code, err) == (0, "")
+    assert rf"wrote {tmp_path}/a\x1b[31m\nb.json" in out.splitlines()
 
 
 def test_json_is_written_though_nobody_reads_the_table(tmp_path):

@@ -2,11 +2,13 @@
 
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from contenders import FEEDBACK, episode, evaluate, save, save_constant
+from matplotlib import rc_context
 from matplotlib.colors import to_rgba
 from rich.console import Console
 
@@ -108,6 +110,17 @@ class TestFigure:
         assert list(least.get_ydata()) == pytest.approx([2.4, 3.6])
         shown = [text.get_text() for text in right.get_legend().get_texts()]
         assert shown == ["first, fallen", "second, fallen", "command", "least for a success"]
+
+    def test_names_are_shown_as_they_are(self, tmp_path):
+        names = ["cost$1$", r"\$2", "_hidden", "a_b^c"]
+        figure = compare_figure(dict.fromkeys(names, ARMS["first"]))
+        left, right = (axes.get_legend().get_texts() for axes in figure.axes)
+        assert [text.get_text() for text in left] == names
+        assert [text.get_text() for text in right][:4] == [f"{name}, fallen" for name in names]
+        with rc_context({"svg.fonttype": "none"}):
+            figure.savefig(tmp_path / "figure.svg")
+        drawn = re.findall("<text [^>]*>(.*?)</text>", (tmp_path / "figure.svg").read_text())
+        assert set(names) <= set(drawn)
 
 
 RANDOM = {"randomization": "full", "jump_height": (0.03, 0.06), "stand_time": 0.0}

@@ -194,6 +194,7 @@ class TestOtherModes:
         assert json.loads((tmp_path / "r.json").read_text())["policy"] == identity
         log = tmp_path / "log.jsonl"
         header = json.loads(log.read_text().splitlines()[0])
+        del header["crc32"]
         assert header["policy"] == identity
         env = make_env(JumpConfig.of(randomization="full", stand_time=0.1))
         episodes = EpisodeLog(log, header, resume=True).episodes
@@ -282,6 +283,7 @@ class TestOtherModes:
         assert isinstance(config.jump_height, float)
         log = tmp_path / "log.jsonl"
         header = json.loads(log.read_text().splitlines()[0])
+        del header["crc32"]
         recorded = EpisodeLog(log, header, resume=True).episodes[seed]
         assert not recorded.is_success
         assert run_episode(make_env(config), seed, policy) == recorded
@@ -332,6 +334,25 @@ class TestNames:
             words.append(str(save_constant(file, 0, 0, 0)))
         names = [contender.name for contender in read_contenders(words)]
         assert names == ["baseline", "first-best", "second-best", "last"]
+
+    def test_nothing_in_a_name_reaches_the_terminal(self, capsys, tmp_path):
+        file = save_constant(tmp_path / "red\x1b[31m\n[bold]\x07.safetensors", 0.1, 0, 0)
+        code, out, err = evaluate(capsys, "--policy", file, *SHORT)
+        assert (code, err) == (0, "")
+        assert r"with red\x1b[31m\n[bold]\x07, after" in out
+        assert out.replace("\n", "").isprintable()
+        file.with_suffix(".json").write_text("[]")
+        message = refusal(capsys, "--policy", file)
+        assert r"red\x1b[31m [bold]\x07.json: not a JSON object" in message
+
+    def test_nothing_in_a_card_reaches_the_terminal(self, capsys, tmp_path):
+        file = save_constant(tmp_path / "mine.safetensors", 0.1, 0, 0)
+        card = json.loads(file.with_suffix(".json").read_text())
+        for field, value in (("kind", "\x1b[2J\n"), ("\x1b[2J\n", 3), ("axes", ["\x1b[2J\n"])):
+            file.with_suffix(".json").write_text(json.dumps(card | {field: value}))
+            message = refusal(capsys, "--policy", file)
+            assert message.removesuffix("\n").isprintable()
+            assert "x1b[2J" in message
 
     def test_the_same_policy_by_two_paths_is_refused(self, tmp_path):
         file = save_constant(tmp_path / "mine.safetensors", 0, 0, 0)

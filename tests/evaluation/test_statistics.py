@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import zlib
 from pathlib import Path
 
 import psutil
@@ -107,14 +108,45 @@ class TestLog:
             {"jump_height": None}, {"jump_height": [0.04, 0.06]}, {"reward": None},
         ],
     )  # fmt: skip
-    def test_damaged_episodes_are_refused(self, tmp_path, change):
+    def test_damaged_episodes_are_dropped(self, tmp_path, change):
+        """Whether the line was changed, or written so with a checksum that fits."""
         log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
         log.append(episode(0))
         header, line = log.path.read_text().splitlines()
-        damaged = strict_json(json.loads(line) | change)
-        log.path.write_text(f"{header}\n{damaged}\n")
-        with pytest.raises(ConfigError, match=r"a log of eval\.py"):
-            EpisodeLog(log.path, self.header, resume=True)
+        entry = json.loads(line)
+        del entry["crc32"]
+        rest = strict_json(entry | change)[:-1]
+        seal = f', "crc32": "{zlib.crc32(rest.encode()):08x}"}}'
+        assert line == f"{strict_json(entry)[:-1]}{line[-len(seal) :]}"
+        for damaged in (strict_json(json.loads(line) | change), rest + seal):
+            log.path.write_text(f"{header}\n{damaged}\n{line}\n{damaged}\n")
+            again = EpisodeLog(log.path, self.header, resume=True)
+            assert (again.damaged, again.episodes) == (2, {0: episode(0)})
+            assert log.path.read_text() == f"{header}\n{line}\n"
+
+    def test_one_changed_character_is_noticed_wherever_it_is(self, tmp_path):
+        log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
+        log.append(episode(0))
+        header, line = log.path.read_bytes().splitlines()
+        for place in range(0, len(line), 37):
+            changed = line[:place] + bytes([line[place] ^ 1]) + line[place + 1 :]
+            log.path.write_bytes(header + b"\n" + changed + b"\n")
+            again = EpisodeLog(log.path, self.header, resume=True)
+            assert (again.damaged, again.episodes) == (1, {})
+        for place in range(0, len(header), 7):
+            changed = header[:place] + bytes([header[place] ^ 1]) + header[place + 1 :]
+            log.path.write_bytes(changed + b"\n" + line + b"\n")
+            with pytest.raises(ConfigError, match=r"a log of eval\.py"):
+                EpisodeLog(log.path, self.header, resume=True)
+
+    def test_a_line_nested_without_end_is_dropped(self, tmp_path):
+        log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
+        for levels in (500, 100_000):
+            rest = '{"a": ' + "[" * levels + "]" * levels
+            seal = f', "crc32": "{zlib.crc32(rest.encode()):08x}"}}'
+            with log.path.open("a") as file:
+                file.write(f"{rest}{seal}\n")
+        assert EpisodeLog(log.path, self.header, resume=True).damaged == 2
 
     def test_bytes_that_are_no_text_are_refused(self, tmp_path):
         path = tmp_path / "log.jsonl"
@@ -194,6 +226,27 @@ class TestCommand:
         assert out == expected
         assert parts.read_bytes() == whole.read_bytes()
 
+    def test_a_damaged_episode_is_jumped_again(self, capsys, tmp_path, monkeypatch):
+        log = tmp_path / "log.jsonl"
+        asked = ("--episodes", "3", "--results", str(log))
+        _, expected, _ = evaluate(capsys, *asked)
+        whole = log.read_bytes()
+        log.write_bytes(
+            whole.replace(b'"seed": 1, "jump_height": 0.04', b'"seed": 1, "jump_height": 0.05')
+        )
+        assert log.read_bytes() != whole
+        seeds, run_jobs = [], series.run_jobs
+
+        def watched(work, jobs):
+            seeds.extend(job.seed for job in work)
+            return run_jobs(work, jobs)
+
+        monkeypatch.setattr(series, "run_jobs", watched)
+        code, out, err = evaluate(capsys, *asked, "--resume")
+        assert (code, out, seeds) == (0, expected, [1])
+        assert f"dropped 1 damaged line of {log}: what is missing is jumped again\n" in err
+        assert log.read_bytes() == whole
+
     def test_a_finished_evaluation_resumes_to_the_same_table_at_once(self, capsys, monkeypatch):
         _, expected, _ = evaluate(capsys, "--episodes", "2")
         run_jobs = series.run_jobs
@@ -219,6 +272,7 @@ class TestCommand:
         env = make_env(options.config)
         replayed = run_episode(env, options.seed)
         header = json.loads(log.read_text().splitlines()[0])
+        del header["crc32"]
         recorded = EpisodeLog(log, header, resume=True).episodes[options.seed]
         assert replayed == recorded
 
@@ -287,7 +341,7 @@ class TestRangeOfCommands:
             for seed, failure, height in ((0, None, 0.03), (1, Failure.TOO_LOW, 0.1 + 0.2 - 0.25))
         ]
         *_, lines = statistics.render(episodes, EvalOptions(config, episodes=2), BASELINE)
-        command = lines.splitlines()[-1].partition("eval.py ")[2]
+        command = lines[-1].partition("eval.py ")[2]
         options = cli.parse(EvalOptions, shlex.split(command))
         assert options == EvalOptions(
             JumpConfig.of(jump_height=0.1 + 0.2 - 0.25), seed=1, view=True
