@@ -151,7 +151,8 @@ def other_code(file: Path) -> bool:
 def _flags(options: TrainOptions) -> dict[str, Any]:
     """What the result depends on, by the names on the command line."""
     values = options.as_dict()
-    return values | values.pop("env")
+    env: dict[str, Any] = values.pop("env")
+    return values | env
 
 
 def _differences(
@@ -160,7 +161,11 @@ def _differences(
     """Name and both values of what differs, inside the groups that both have."""
     for name, value in ours.items():
         other = theirs[name]
-        if isinstance(value, Mapping) and isinstance(other, Mapping) and value.keys() == other.keys():
+        if (
+            isinstance(value, Mapping)
+            and isinstance(other, Mapping)
+            and value.keys() == other.keys()
+        ):
             yield from _differences(value, other, f"{prefix}{name}.")
         elif value != other:
             yield prefix + name, value, other

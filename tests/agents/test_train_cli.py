@@ -22,6 +22,7 @@ from agents.options import TASK, PPOOptions, TrainOptions
 from agents.run_folder import lock_run
 from icub_jump_env.evaluation.cli import evaluate
 from icub_jump_env.evaluation.report.output import write_json
+from icub_jump_env.planning.residual import ResidualConfig
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -88,8 +89,11 @@ def test_flags_reach_the_options(asked):
     assert asked() == TrainOptions()
     assert asked("--controller", "torque", "--inputs", "command", "--axes", "forward", "lateral",
                  "--ppo.log-std", "-0.5", "-3", "--ppo.hidden", "32", "--seed", "7",
+                 "--stand-time", "0.5", "--residual.bandwidth", "20",
                  "--run", "here") == TrainOptions(
-        env=TASK.replace(controller="torque"),
+        env=TASK.replace(
+            controller="torque", stand_time=0.5, residual=ResidualConfig(bandwidth=20.0)
+        ),
         inputs="command",
         axes=("forward", "lateral"),
         ppo=PPOOptions(log_std=(-0.5, -3.0), hidden=(32,)),

@@ -21,6 +21,7 @@ from icub_jump_env.evaluation.episodes.series import Series
 from icub_jump_env.evaluation.figures import policy as policy_figures
 from icub_jump_env.evaluation.modes import video, view
 from icub_jump_env.policy import load_policy
+from icub_jump_env.policy.saving import SHIPPED
 
 QUIET = Console(file=io.StringIO())
 SHORT = ("--stand-time", "0.1")
@@ -353,6 +354,34 @@ class TestNames:
             message = refusal(capsys, "--policy", file)
             assert message.removesuffix("\n").isprintable()
             assert "x1b[2J" in message
+
+    def test_shipped_policies_and_the_baseline_have_names(self):
+        found = read_contenders(["torque", "baseline", "torque-constant"])
+        assert [contender.name for contender in found] == ["torque", "baseline", "torque-constant"]
+        assert [contender.is_baseline for contender in found] == [False, True, False]
+        (by_path,) = read_contenders([str(SHIPPED / "torque.safetensors")])
+        assert found[0].identity == by_path.identity
+
+    @pytest.mark.parametrize(
+        ("words", "mode", "height"),
+        [
+            (["--policy", "torque"], "nominal", 0.04),
+            (["--compare", "baseline", "torque", "torque-open-loop"], "compare", (0.04, 0.08)),
+        ],
+    )
+    def test_the_command_line_takes_the_names(self, capsys, monkeypatch, words, mode, height):
+        asked = []
+        monkeypatch.setattr(
+            f"icub_jump_env.evaluation.modes.{mode}.run",
+            lambda options, contenders, *_: asked.append((options, contenders)),
+        )
+        assert evaluate(capsys, *words)[0] == 0
+        ((options, contenders),) = asked
+        assert [contender.name for contender in contenders] == words[1:]
+        config = load_policy("torque").card.config
+        assert options.config.controller == config.controller
+        assert options.config.com_displacement == config.com_displacement
+        assert options.config.jump_height == height
 
     def test_the_same_policy_by_two_paths_is_refused(self, tmp_path):
         file = save_constant(tmp_path / "mine.safetensors", 0, 0, 0)

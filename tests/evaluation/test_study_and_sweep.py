@@ -83,7 +83,9 @@ class TestRealism:
             low, middle, high = late[controller]["percentiles"]["flight_height"]
             assert [low, middle, high] == pytest.approx(np.percentile(rises, [10, 50, 90]))
             assert low < high < low + 0.002
-            assert late[controller]["landed"]["total"] == offset[controller]["landed"]["total"] == 2
+            assert (
+                late[controller]["landed"]["total"] == offset[controller]["landed"]["total"] == 2
+            )
             assert f"{100 * middle:.2f}" in console.file.getvalue()
         low, _, high = offset["torque"]["percentiles"]["flight_height"]
         assert high > low
@@ -111,9 +113,7 @@ def posed(name, asked, **options):
     assert [job.seed for job in asked] == [0, 1] * (len(asked) // 2)
     owners = [(c, name) for c in STUDIES[name].cases() for name in ("velocity", "torque")]
     assert [job.config for job in asked[::2]] == [job.config for job in asked[1::2]]
-    found = [
-        (*owner, job.config) for owner, job in zip(owners, asked[::2], strict=True)
-    ]
+    found = [(*owner, job.config) for owner, job in zip(owners, asked[::2], strict=True)]
     return found, console.file.getvalue()
 
 
@@ -142,7 +142,9 @@ class TestAllStudies:
             if label.group == group
         ]
         assert [(form, controller) for form, controller, _ in forms] == [
-            (form, controller) for form in ("soft", "hard") for controller in ("velocity", "torque")
+            (form, controller)
+            for form in ("soft", "hard")
+            for controller in ("velocity", "torque")
         ]
         for form, controller, config in forms:
             assert config.controller_config.constraints == form
@@ -184,7 +186,9 @@ class TestAllStudies:
     def test_what_a_study_varies_cannot_be_chosen(self, asked, name, changes):
         options = EvalOptions(JumpConfig.of(**changes), study=name)
         ((field, _),) = changes.items()
-        with pytest.raises(ConfigError, match=f"not with --study {name}, which varies it") as refusal:
+        with pytest.raises(
+            ConfigError, match=f"not with --study {name}, which varies it"
+        ) as refusal:
             study.run_cases(STUDIES[name], options, Console(quiet=True))
         assert refusal.value.field == field
         assert not asked
