@@ -135,10 +135,8 @@ def _claim(options: TrainOptions, console: Console) -> Sequence[str]:
             console,
             f"{options.folder} was begun with other code: it will not end as it would have",
         )
-    recorded = _flags(read_options(file))
-    for flag, value in _flags(options).items():
-        if value != recorded[flag]:
-            raise ConfigError(flag, value, f"{recorded[flag]!r}, as {file} has it")
+    for flag, value, recorded in _differences(_flags(options), _flags(read_options(file))):
+        raise ConfigError(flag, value, f"{recorded!r}, as {file} has it")
     return check_command(read_json(file.read_bytes()).get(COMMAND, command()))
 
 
@@ -153,8 +151,24 @@ def other_code(file: Path) -> bool:
 def _flags(options: TrainOptions) -> dict[str, Any]:
     """What the result depends on, by the names on the command line."""
     values = options.as_dict()
-    env, ppo = values.pop("env"), values.pop("ppo")
-    return {**values, **env, **{f"ppo.{name}": value for name, value in ppo.items()}}
+    env: dict[str, Any] = values.pop("env")
+    return values | env
+
+
+def _differences(
+    ours: Mapping[str, Any], theirs: Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, Any, Any]]:
+    """Name and both values of what differs, inside the groups that both have."""
+    for name, value in ours.items():
+        other = theirs[name]
+        if (
+            isinstance(value, Mapping)
+            and isinstance(other, Mapping)
+            and value.keys() == other.keys()
+        ):
+            yield from _differences(value, other, f"{prefix}{name}.")
+        elif value != other:
+            yield prefix + name, value, other
 
 
 def _learn(

@@ -147,9 +147,9 @@ _PATHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 into it."""
 
 
-def group_of(shortcut: str) -> str | None:
-    """The field of :class:`JumpConfig` that holds what a shortcut stands for."""
-    return _PATHS[shortcut][0] if shortcut in _PATHS else None
+def path_to(name: str) -> tuple[str, ...]:
+    """The way to a field or to what a shortcut stands for, from :class:`JumpConfig` on."""
+    return _PATHS.get(name, (name,))
 
 
 @dataclass(frozen=True)
@@ -382,7 +382,7 @@ class JumpConfig:
         """The value of a field or shortcut; of the controller its name."""
         if name == "controller":
             return self.controller_name
-        first, *path = _PATHS.get(name, (name,))
+        first, *path = path_to(name)
         value = self.controller_config if first == "controller" else getattr(self, first)
         for step in path:
             value = getattr(value, step)

@@ -59,7 +59,7 @@ def test_video_is_recorded(offscreen, tmp_path):
         "from pathlib import Path\n"
         "import imageio.v3 as iio\n"
         f"file = Path({str(file)!r})\n"
-        "record_video(file, JumpConfig(stand_time=0.1, agent_frequency=25.0), 0, Console())\n"
+        "record_video(file, JumpConfig.of(stand_time=0.1, agent_frequency=25.0), 0, Console())\n"
         "print(*iio.imread(file).shape)\n"
     )
     result = subprocess.run(
