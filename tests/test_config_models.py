@@ -108,7 +108,7 @@ ALL_DIFFERENT = JumpConfig(
         phases=PhaseConfig(launch_end="lift_off", lift_off=5.0, touch_down=20.0, lift_off_ticks=3),
         com_stiffness=150.0,
         posture_weight=tuple(np.linspace(0.1, 2.0, 23)),
-        continuity_weight=(1e-3, 2e-3, 3e-3),
+        smoothness_weight=(1e-3, 2e-3, 3e-3),
         contact=ContactConfig(friction=0.4),
     ),
     jump_height=(0.03, 0.05),

@@ -137,9 +137,7 @@ def test_wheel_ships_the_agents_the_policies_and_the_command(wheel):
     names = set(content.namelist())
     agents = {f"icub_jump_env/agents/{file.name}" for file in AGENTS}
     assert agents == {
-        name
-        for name in names
-        if name.startswith("icub_jump_env/agents/") and name.endswith(".py")
+        name for name in names if name.startswith("icub_jump_env/agents/") and name.endswith(".py")
     }
     folder = "icub_jump_env/policy/shipped"
     assert {name for name in names if name.startswith(folder)} == {
