@@ -2,13 +2,21 @@
 
 import math
 import pickle
+from functools import partial
 
 import gymnasium
 import numpy as np
 import pytest
 from conftest import ZERO, rollout
 
-from icub_jump_env.errors import ActionError, ConfigError, ICubJumpError, shown
+from icub_jump_env.env import ICubJumpEnv
+from icub_jump_env.errors import (
+    ActionError,
+    ConfigError,
+    ICubJumpError,
+    UnknownFieldError,
+    shown,
+)
 
 
 class TestDivergence:
@@ -82,13 +90,13 @@ class TestBadInput:
             ("jump_height", None), ("jump_height", True), ("com_displacement", 0.5),
             ("com_displacement", -0.1), ("com_displacement", math.inf), ("com_scaling", "time"),
             ("momentum_control", "yes"), ("momentum_control", 1), ("solver", "magic"),
-            ("solver", ["daqp"]), ("residual_scale", 0.1), ("residual_scale", (0.1, 0.1)),
-            ("residual_scale", (0.1, 0.1, -0.1)), ("residual_scale", (0.1, 0.1, math.nan)),
-            ("residual_scale", "abc"), ("timestep", 0.0), ("timestep", 0.1),
-            ("timestep", math.nan), ("control_frequency", 150.0), ("control_frequency", 0.0),
-            ("control_frequency", 3000.0), ("agent_frequency", 300.0), ("stand_time", -1.0),
-            ("stand_time", math.inf), ("ankle_shift", 15), ("render_mode", "ansi"),
-            ("wings", 2), ("jump_height", 10**400), ("residual_scale", {0.01, 0.02, 0.03}),
+            ("solver", ["daqp"]), ("timestep", 0.0), ("timestep", 0.1), ("timestep", math.nan),
+            ("agent_frequency", 300.0), ("stand_time", -1.0), ("stand_time", math.inf),
+            ("ankle_shift", 15), ("render_mode", "ansi"), ("jump_height", 10**400),
+            ("robot", "iCubGenova03"), ("robot", "left_hand_mk3"), ("robot", "Nope"), ("robot", 4),
+            ("robot", None), ("constraints", "firm"), ("launch_end", "never"), ("width", 8),
+            ("width", 640.0), ("height", 5000), ("camera", "back"), ("reward", 1.0),
+            ("success", None), ("residual", (0.1, 0.1, 0.1)), ("rendering", "human"),
         ],
     )  # fmt: skip
     @pytest.mark.filterwarnings("ignore:.*not in the possible render_modes")
@@ -100,6 +108,40 @@ class TestBadInput:
         assert refusal.value.allowed
         assert isinstance(refusal.value, ICubJumpError)
         assert isinstance(refusal.value, ValueError)
+
+    @pytest.mark.parametrize(
+        ("given", "named", "words"),
+        [
+            *(({"residual_scale": scale}, "residual.scale", repr(scale)) for scale in (
+                0.1, (0.1, 0.1), (0.1, 0.1, -0.1), (0.1, 0.1, math.nan), "abc", {0.01, 0.02, 0.03},
+            )),
+            ({"control_frequency": 0.0}, "frequency", "0.0"),
+            ({"control_frequency": 150.0}, "timestep", "1/150 s"),
+            ({"control_frequency": 3000.0}, "timestep", "1/3000 s"),
+            ({"residual_phases": "flight"}, "residual.phases", "'flight'"),
+            ({"residual": {"bandwidth": 0.0}}, "residual.bandwidth", "0.0"),
+            ({"residual": {"gain": 1.0}}, "gain", "no such field; the fields of residual are"),
+            ({"reward": {"height": -1.0}}, "height", "-1.0"),
+            ({"reward": {"hight": 1.0}}, "hight", "rotation"),
+            ({"success": {"flight_time": 2.0}}, "flight_time", "2.0"),
+            ({"rendering": {"width": 1e9}}, "width", "16 to 1920"),
+        ],
+    )  # fmt: skip
+    def test_values_inside_groups_are_refused_by_the_name_in_the_group(self, given, named, words):
+        with pytest.raises(ConfigError) as refusal:
+            ICubJumpEnv(**given)
+        assert refusal.value.field == named
+        assert words in str(refusal.value)
+
+    @pytest.mark.parametrize("make", [ICubJumpEnv, partial(gymnasium.make, "ICubJump-v0")])
+    def test_an_unknown_keyword_is_a_type_error_that_names_it_and_the_fields(self, make):
+        """Gymnasium raises it again from its message."""
+        with pytest.raises(TypeError, match=r"^wings=2 is not allowed: no such field") as refusal:
+            make(wings=2)
+        assert isinstance(refusal.value, ConfigError)
+        assert isinstance(refusal.value, UnknownFieldError)
+        for name in ("jump_height", "stand_time", "reward", "render_mode"):
+            assert name in str(refusal.value)
 
     def test_numpy_values_are_welcome(self):
         env = gymnasium.make(

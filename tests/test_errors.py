@@ -75,7 +75,7 @@ def test_any_value_gives_one_printable_line(value):
 def test_unknown_fields_with_any_name():
     for name in (HOSTILE, "n" * 100_000):
         with pytest.raises(ConfigError) as refusal:
-            JumpConfig.from_kwargs({name: 3})
+            JumpConfig.of(**{name: 3})
         assert clean(str(refusal.value))
         assert "=3 is not allowed: no such field; the fields are controller" in str(refusal.value)
 

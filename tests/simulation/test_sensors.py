@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import Randomization, draw_world
@@ -21,7 +22,7 @@ from icub_jump_env.simulation.sensors import Sensors
 
 ROBOT = load_robot()
 
-NOMINAL = draw_world(Randomization(), 1, np.random.default_rng(0))
+NOMINAL = draw_world(Randomization(), ROBOT, 1, np.random.default_rng(0))
 zeros = np.zeros(ROBOT.n_joints)
 
 
@@ -40,9 +41,8 @@ def sensors(physics, seed=0, world=NOMINAL, **config) -> Sensors:
 
 
 def readings(made):
-    made.read()
-    names = ("joint_position", "joint_velocity", "gravity", "gyro", "foot_force")
-    return {name: getattr(made, name).copy() for name in names}
+    taken = made.read()
+    return {name: getattr(taken, name).copy() for name in Readings.__slots__}
 
 
 READING = {"joint_position": "joint_position", "joint_velocity": "joint_velocity",
