@@ -26,6 +26,9 @@ from icub_jump_env.shortcuts import Shortcuts
 
 REPOSITORY = Path(__file__).parents[2]
 
+ONE_EPISODE = ["--randomization", "full", "--stand-time", "0"]
+"""A short work for another process."""
+
 
 @pytest.fixture
 def coarse(monkeypatch):
@@ -103,7 +106,7 @@ def test_missing_egl_does_not_matter_without_pictures(tmp_path):
         **{k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")},
         "PYTHONPATH": f"{tmp_path}:{REPOSITORY}",
     }
-    for arguments, code in ((["--stand-time", "0.1"], 0), (["--video", "jump.mp4"], 2)):
+    for arguments, code in ((ONE_EPISODE, 0), (["--video", "jump.mp4"], 2)):
         result = subprocess.run(
             [sys.executable, str(REPOSITORY / "eval.py"), *arguments],
             cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
@@ -349,12 +352,12 @@ def test_what_is_said_is_one_line_without_orders_for_the_terminal(capsys, tmp_pa
 
 
 def test_json_is_written_though_nobody_reads_the_table(tmp_path):
-    command = [sys.executable, str(REPOSITORY / "eval.py"), "--stand-time", "0.1", "--json", "j"]
+    command = [sys.executable, str(REPOSITORY / "eval.py"), *ONE_EPISODE, "--json", "j"]
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     ) as process:
         process.stdout.close()
-    assert json.loads((tmp_path / "j").read_text())["mode"] == "nominal"
+    assert json.loads((tmp_path / "j").read_text())["mode"] == "statistics"
 
 
 def test_eval_py_runs_from_anywhere(tmp_path):
