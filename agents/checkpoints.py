@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping
@@ -15,13 +16,18 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 
-from icub_jump_env.errors import ICubJumpError, PolicyFileError
+from icub_jump_env.checks import check_count, check_type
+from icub_jump_env.errors import ConfigError, ICubJumpError, PolicyFileError, shown
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy.files import load_tensors, save_tensors
 
 from .vec_env import JumpVecEnv
 
+MAX_CHECKPOINT_SIZE = 64 * 2**20
+"""Largest file of a checkpoint (bytes); that of the largest networks has a third."""
+
 _NAME = re.compile(r"checkpoint-(\d{6,})\.(safetensors|json)")
+_TENSOR = re.compile(r"policy\.[\w.]+|optimizer\.\d+\.(step|exp_avg|exp_avg_sq)")
 _FINGERPRINT = "card"
 """Name of the array that holds the hash of the card, whose own hash is of the arrays alone."""
 
@@ -74,6 +80,7 @@ def save_checkpoint(folder: Path, model: PPO, number: int, progress: Mapping[str
         tensors |= {f"optimizer.{index}.{key}": value for key, value in state.items()}
     arrays = {name: value.numpy() for name, value in tensors.items()}
     card = {
+        "number": number,
         "param_groups": optimizer["param_groups"],
         "num_timesteps": model.num_timesteps,
         "n_updates": model._n_updates,
@@ -126,6 +133,9 @@ def restore(model: PPO, checkpoint: Checkpoint) -> None:
     Raises:
         CheckpointError: If it does not fit the model, which is of no use then.
     """
+    problem = _misfit(model, checkpoint)
+    if problem is not None:
+        raise CheckpointError(f"checkpoint {checkpoint.number} does not fit the model: {problem}")
     parameters: dict[str, torch.Tensor] = {}
     state: dict[int, dict[str, torch.Tensor]] = defaultdict(dict)
     try:
@@ -142,7 +152,7 @@ def restore(model: PPO, checkpoint: Checkpoint) -> None:
         model.policy.optimizer.load_state_dict({"state": dict(state), "param_groups": groups})
     except (RuntimeError, ValueError, TypeError, KeyError) as error:
         message = f"checkpoint {checkpoint.number} does not fit the model: {error}"
-        raise CheckpointError(" ".join(message.split())) from error
+        raise CheckpointError(message) from error
     model.num_timesteps = checkpoint.num_timesteps
     model._n_updates = checkpoint.n_updates
 
@@ -186,14 +196,72 @@ def _words(seed: int, number: int, num_envs: int) -> list[int]:
 
 
 def _load(path: Path, number: int) -> Checkpoint:
-    arrays, card = load_tensors(path)
+    arrays, card = load_tensors(path, MAX_CHECKPOINT_SIZE)
+    card_file = str(path.with_suffix(".json"))
     del card["sha256"]
     if not np.array_equal(arrays.pop(_FINGERPRINT, ()), _fingerprint(card)):
-        raise PolicyFileError(str(path.with_suffix(".json")), "damaged")
+        raise PolicyFileError(card_file, "damaged")
     try:
-        return Checkpoint(number, arrays, **card)
+        checkpoint = Checkpoint(tensors=arrays, **card)
+        if type(checkpoint.number) is not int or checkpoint.number != number:
+            raise ConfigError("number", checkpoint.number, f"{number}, as the file is called")
+        _check(checkpoint)
     except TypeError:
-        raise PolicyFileError(str(path.with_suffix(".json")), "of another version") from None
+        raise PolicyFileError(card_file, "of another version") from None
+    except ConfigError as error:
+        raise PolicyFileError(card_file, str(error)) from None
+    return checkpoint
+
+
+def _check(checkpoint: Checkpoint) -> None:
+    """Refuse what no training wrote.
+
+    Raises:
+        ConfigError: If a value is of the wrong type or out of range.
+    """
+    for field in ("num_timesteps", "n_updates"):
+        check_count(field, getattr(checkpoint, field), 0)
+    check_type("progress", checkpoint.progress, dict)
+    groups = checkpoint.param_groups
+    if not isinstance(groups, list) or not all(isinstance(group, dict) for group in groups):
+        raise ConfigError("param_groups", groups, "a list of mappings")
+    for name, array in checkpoint.tensors.items():
+        if not _TENSOR.fullmatch(name):
+            raise ConfigError("tensors", name, "parameters, and the state of Adam")
+        if array.dtype != np.float32:
+            raise ConfigError(name, str(array.dtype), "float32")
+        if not np.isfinite(array).all():
+            raise ConfigError(name, float(array[~np.isfinite(array)][0]), "finite numbers")
+
+
+def _misfit(model: PPO, checkpoint: Checkpoint) -> str | None:
+    """What torch takes without a complaint though it is not the model's."""
+    optimizer = model.policy.optimizer
+    shapes = [tuple(p.shape) for group in optimizer.param_groups for p in group["params"]]
+    for name, array in checkpoint.tensors.items():
+        if not _TENSOR.fullmatch(name):
+            return f"{shown(name)} is none of its tensors"
+        owner, *rest = name.split(".")
+        if owner == "optimizer":
+            index, key = int(rest[0]), rest[1]
+            if index >= len(shapes):
+                return f"it has no parameter {index}"
+            shape = () if key == "step" else shapes[index]
+            if array.shape != shape:
+                return f"{name} has shape {array.shape} instead of {shape}"
+    ours = optimizer.state_dict()["param_groups"]
+    theirs = checkpoint.param_groups
+    if not isinstance(theirs, list) or len(theirs) != len(ours):
+        return f"{len(ours)} groups of parameters are missing"
+    for mine, group in zip(ours, theirs, strict=True):
+        for key, value in mine.items():
+            given = group.get(key)
+            kind = list if isinstance(value, tuple) else type(value)
+            numbers = given if isinstance(given, list) else [given]
+            finite = all(not isinstance(x, float) or math.isfinite(x) for x in numbers)
+            if type(given) is not kind or not finite:
+                return f"{key}={shown(given)} instead of such as {shown(value)}"
+    return None
 
 
 def _fingerprint(card: Mapping[str, Any]) -> NDArray[np.uint8]:

@@ -17,7 +17,7 @@ from icub_jump_env.evaluation.report.output import say
 from .options import OPTIONS, TrainOptions, read_options
 
 _REMEDY = (
-    "training needs stable-baselines3 and tensorboard; in a checkout: "
+    "training needs the extra 'rl', in the repository's folder: "
     'pip install -c constraints.txt -e ".[rl]"'
 )
 

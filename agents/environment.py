@@ -86,7 +86,7 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
         """As :meth:`ICubJumpEnv.step`; the last one goes on to the end of the episode."""
         residual = np.zeros(len(AXES), np.float32)
         if not self._over:
-            residual[self._axes] = self._scale * action
+            residual[self._axes] = self._scale * np.clip(action, -1.0, 1.0)
         self._step += 1
         ends = self._step >= self._n_steps
         observation, reward, self._over, _, info = self.env.step(residual)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,8 +17,9 @@ from icub_jump_env.checks import (
     check_numbers,
     store,
 )
-from icub_jump_env.config import JumpConfig, Shortcuts
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.files import read_json
 from icub_jump_env.observation import SLICES, entry_scales
 from icub_jump_env.policy.fields import (
     ACTION_SCALE_RANGE,
@@ -27,6 +27,7 @@ from icub_jump_env.policy.fields import (
     check_axes,
     check_hidden,
 )
+from icub_jump_env.shortcuts import Shortcuts
 
 Inputs = Literal["all", "command"]
 
@@ -89,23 +90,23 @@ class PPOOptions:
     ramp: int = 0
 
     def __post_init__(self) -> None:
-        for name, least in (
-            ("episodes", 2),
-            ("batch_size", 2),
-            ("epochs", 1),
-            ("warmup", 0),
-            ("ramp", 0),
+        for name, least, unit in (
+            ("episodes", 2, ""),
+            ("batch_size", 2, "steps"),
+            ("epochs", 1, ""),
+            ("warmup", 0, "updates"),
+            ("ramp", 0, "updates"),
         ):
-            check_count(name, getattr(self, name), least, 100_000)
-        for name, low, high in (
-            ("learning_rate", 1e-8, 1.0),
-            ("gamma", 0.0, 1.0),
-            ("gae_lambda", 0.0, 1.0),
-            ("clip_range", 1e-3, 1.0),
-            ("target_kl", 1e-6, 10.0),
-            ("action_scale", *ACTION_SCALE_RANGE),
+            check_count(name, getattr(self, name), least, 100_000, unit)
+        for name, low, high, unit in (
+            ("learning_rate", 1e-8, 1.0, ""),
+            ("gamma", 0.0, 1.0, "per step"),
+            ("gae_lambda", 0.0, 1.0, "per step"),
+            ("clip_range", 1e-3, 1.0, ""),
+            ("target_kl", 1e-6, 10.0, ""),
+            ("action_scale", *ACTION_SCALE_RANGE, "of the largest action"),
         ):
-            store(self, **{name: check_number(name, getattr(self, name), low, high)})
+            store(self, **{name: check_number(name, getattr(self, name), low, high, unit)})
         store(self, hidden=check_hidden(self.hidden))
         store(self, log_std=check_numbers("log_std", self.log_std, 2, -10.0, 2.0))
 
@@ -150,10 +151,10 @@ class TrainOptions:
         store(self, env=self.env.replace(**vars(self.shortcuts)), shortcuts=Shortcuts())
         check_choice("inputs", self.inputs, ("all", "command"))
         store(self, axes=check_axes(self.axes))
-        check_count("timesteps", self.timesteps, 1, 1_000_000_000)
+        check_count("timesteps", self.timesteps, 1, 1_000_000_000, "steps")
         check_count("seed", self.seed, 0, 2**32 - 1)
-        check_count("jobs", self.jobs, 1, 1000)
-        check_count("checkpoint_every", self.checkpoint_every, 1)
+        check_count("jobs", self.jobs, 1, 1000, "processes")
+        check_count("checkpoint_every", self.checkpoint_every, 1, unit="updates")
         if self.env.rendering.mode is not None:
             raise ConfigError("render_mode", self.env.rendering.mode, "not in a training")
         if self.ppo.episodes % self.jobs:
@@ -187,13 +188,22 @@ def read_options(path: Path) -> TrainOptions:
     """Options from a file; what it does not say is as by default.
 
     Raises:
-        ConfigError: If it is not a file of options, or a value is out of range.
+        ConfigError: If it is not a file of options, or a value is out of range; names the file.
     """
+    try:
+        return _from_file(path)
+    except ConfigError as error:
+        if error.value == str(path):
+            raise
+        raise type(error)(error.field, error.value, f"{error.allowed}, in {path}") from None
+
+
+def _from_file(path: Path) -> TrainOptions:
     try:
         if path.exists() and not path.is_file():
             raise OSError("it is none")
-        values = json.loads(path.read_text())
-    except (OSError, ValueError, RecursionError) as error:
+        values = read_json(path.read_bytes())
+    except (OSError, ValueError) as error:
         raise ConfigError("config", str(path), f"a JSON file ({error})") from None
     if not isinstance(values, dict):
         raise ConfigError("config", str(path), "a JSON object")

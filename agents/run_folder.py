@@ -26,14 +26,17 @@ def lock_run(folder: Path) -> Iterator[None]:
 
     Raises:
         RunLockedError: If another run, or another one of this process, has it.
+        OSError: If the file system refuses, or the file that holds the lock is a link.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / ".lock").open("a+") as file:
+    # Not through a link: the file is overwritten.
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
+    with os.fdopen(os.open(folder / ".lock", flags, 0o644), "r+") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             file.seek(0)
-            holder = file.read() or "unknown"  # it is about to say
+            holder = file.read(20) or "unknown"  # it is about to say
             raise RunLockedError(f"{folder} is in use by another run, process {holder}") from None
         # The file stays: one who opened it would hold a lock on what another removes.
         file.truncate(0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,17 +26,20 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch.utils.tensorboard import SummaryWriter
 
+from icub_jump_env.checks import check_count, check_number, check_type
 from icub_jump_env.errors import ConfigError, PolicyFileError
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.quantities import CM, DEG, PERCENT, commands, number
 from icub_jump_env.evaluation.report.output import progress_display, say, write_json
 from icub_jump_env.evaluation.report.provenance import SOURCE, command, source, versions
 from icub_jump_env.evaluation.statistics.summary import Command, Summary, by_command, command_range
+from icub_jump_env.files import read_json
 from icub_jump_env.policy import load_policy, save_policy
 from icub_jump_env.policy.fields import check_command
 
 from .checkpoints import (
     Checkpoint,
+    CheckpointError,
     begin_segment,
     load_latest,
     restore,
@@ -59,6 +61,9 @@ LAST = "last.safetensors"
 
 MOST_CHECKPOINTS = 500
 """Of a run; the learning curve is in each of them, whose size is limited."""
+
+_LARGEST_SCORE = 1e6
+"""No mean reward comes near it."""
 
 _PACKAGES = ("stable-baselines3", "torch")
 
@@ -130,11 +135,9 @@ def _claim(options: TrainOptions, console: Console) -> Sequence[str]:
             console,
             f"{options.folder} was begun with other code: it will not end as it would have",
         )
-    recorded = _flags(read_options(file))
-    for flag, value in _flags(options).items():
-        if value != recorded[flag]:
-            raise ConfigError(flag, value, f"{recorded[flag]!r}, as {file} has it")
-    return check_command(json.loads(file.read_text()).get(COMMAND, command()))
+    for flag, value, recorded in _differences(_flags(options), _flags(read_options(file))):
+        raise ConfigError(flag, value, f"{recorded!r}, as {file} has it")
+    return check_command(read_json(file.read_bytes()).get(COMMAND, command()))
 
 
 def other_code(file: Path) -> bool:
@@ -148,8 +151,24 @@ def other_code(file: Path) -> bool:
 def _flags(options: TrainOptions) -> dict[str, Any]:
     """What the result depends on, by the names on the command line."""
     values = options.as_dict()
-    env, ppo = values.pop("env"), values.pop("ppo")
-    return {**values, **env, **{f"ppo.{name}": value for name, value in ppo.items()}}
+    env: dict[str, Any] = values.pop("env")
+    return values | env
+
+
+def _differences(
+    ours: Mapping[str, Any], theirs: Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, Any, Any]]:
+    """Name and both values of what differs, inside the groups that both have."""
+    for name, value in ours.items():
+        other = theirs[name]
+        if (
+            isinstance(value, Mapping)
+            and isinstance(other, Mapping)
+            and value.keys() == other.keys()
+        ):
+            yield from _differences(value, other, f"{prefix}{name}.")
+        elif value != other:
+            yield prefix + name, value, other
 
 
 def _learn(
@@ -221,7 +240,7 @@ class _Run(BaseCallback):
     def resume(self, number: int, progress: Mapping[str, Any]) -> None:
         """Take up what a checkpoint noted."""
         self._number, self._resumed = number, True
-        self._updates, self._curve = progress["updates"], progress["curve"]
+        self._updates, self._curve = _check_progress(number, progress)
         self._minutes = _read_minutes(self._options.folder / CURVE, len(self._curve))
         seed, jobs = self._options.seed, self._options.jobs
         self._seeds = [segment_seeds(seed, earlier, jobs) for earlier in range(1, number)]
@@ -345,10 +364,29 @@ class _Run(BaseCallback):
         )
 
 
+def _check_progress(number: int, progress: Mapping[str, Any]) -> tuple[int, list[dict[str, Any]]]:
+    """Updates and learning curve, as a checkpoint noted them.
+
+    Raises:
+        CheckpointError: If it did not.
+    """
+    try:
+        updates = check_count("updates", progress.get("updates"), 0, unit="updates")
+        curve = progress.get("curve")
+        if not isinstance(curve, list) or len(curve) != number:
+            raise ConfigError("curve", curve, f"a list of {number} evaluations")
+        for point in curve:
+            check_type("point of the curve", point, dict)
+            check_number("score", point.get("score"), -_LARGEST_SCORE, _LARGEST_SCORE)
+    except ConfigError as error:
+        raise CheckpointError(f"checkpoint {number}: {error}") from None
+    return updates, curve
+
+
 def _read_minutes(file: Path, count: int) -> list[float | None]:
     """What the first evaluations took; unknown if the file is gone, for it is a mere report."""
     try:
-        minutes = json.loads(file.read_text())["minutes"]
+        minutes = read_json(file.read_bytes())["minutes"]
         return [None if value is None else float(value) for value in minutes[:count]]
     except (OSError, ValueError, TypeError, KeyError):
         return [None] * count

@@ -63,6 +63,11 @@ class Stopwatch:
         """Median duration of each part."""
         return {part: float(np.median(values)) for part, values in self._durations.items()}
 
+    def tail(self, *parts: str) -> tuple[float, float]:
+        """99th percentile and largest of the sum of some parts."""
+        total = np.sum([self._durations[part] for part in parts], axis=0)
+        return float(np.percentile(total, 99)), float(total.max())
+
 
 def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
     """Print the control tick and its parts, timed in turn at the same states."""
@@ -107,6 +112,12 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
     before = [f"{part} {medians.pop(part):.1f} us" for part in ("estimate", "set point")]
     for part, duration in medians.items():
         print(f"  {part:24s} {duration:7.1f} us")
+    p99, worst = watch.tail("estimate", "set point", "tick")
+    period = 1e6 / config.frequency
+    print(
+        f"  from readings to command: 99 % within {p99:.0f} us, worst {worst:.0f} us, "
+        f"of a period of {period:.0f} us"
+    )
     print(f"  before it: {', '.join(before)}")
 
 

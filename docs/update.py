@@ -7,16 +7,18 @@ fenced block that shows its output:
     (fenced block)
 
     python docs/update.py
+    python docs/update.py --only "--study robots"
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 DOCS = Path(__file__).parent
@@ -50,10 +52,16 @@ def fresh(block: re.Match[str], output: Callable[[str], str] = output_of) -> str
     return f"<!-- {command} -->\n{shown}\n"
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Update README.md and all documents, each block as soon as its command has run."""
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
+    parser.add_argument("--only", default="", help="run the commands that contain these words")
+    only = parser.parse_args(arguments).only
     for file in (REPOSITORY / "README.md", *sorted(DOCS.glob("*.md"))):
         for block in BLOCK.finditer(file.read_text()):
+            if only not in block["command"]:
+                continue
             print(f"{file.relative_to(REPOSITORY)}: {block['command']}")
             file.write_text(file.read_text().replace(block[0], fresh(block)))
 

@@ -54,7 +54,7 @@ class AblationOptions:
 
     def __post_init__(self) -> None:
         check_count("episodes", self.episodes, 1, len(TEST))
-        check_count("jobs", self.jobs, 1)
+        check_count("jobs", self.jobs, 1, unit="processes")
 
 
 def compare_trainings(options: AblationOptions) -> None:

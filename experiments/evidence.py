@@ -75,7 +75,7 @@ class EvidenceOptions:
     train_only: bool = False
 
     def __post_init__(self) -> None:
-        check_count("jobs", self.jobs, 1)
+        check_count("jobs", self.jobs, 1, unit="processes")
 
 
 def trainings() -> dict[str, tuple[str, ...]]:

@@ -81,7 +81,7 @@ class FrontierOptions:
     plot: Path | None = None
 
     def __post_init__(self) -> None:
-        check_count("jobs", self.jobs, 1)
+        check_count("jobs", self.jobs, 1, unit="processes")
 
 
 @dataclass(frozen=True)

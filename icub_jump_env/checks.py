@@ -32,29 +32,28 @@ def check_flag(field: str, value: Any) -> bool:
     return bool(value)
 
 
-def check_number(field: str, value: Any, low: float, high: float) -> float:
-    """Refuse anything but a real number from ``low`` to ``high``; return it as a float."""
+def check_number(field: str, value: Any, low: float, high: float, unit: str = "") -> float:
+    """Refuse anything but a real number from ``low`` to ``high`` (``unit``); return a float."""
     number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
     # Compared before converting: a float cannot hold every int.
     if not number or not low <= value <= high:
-        raise ConfigError(field, value, f"a number from {low:g} to {high:g}")
+        raise ConfigError(field, value, f"a number {_range(low, high, unit)}")
     return float(value)
 
 
-def check_count(field: str, value: Any, low: int, high: int | None = None) -> int:
-    """Refuse anything but a whole number from ``low`` to ``high``; return it as an int."""
+def check_count(field: str, value: Any, low: int, high: int | None = None, unit: str = "") -> int:
+    """Refuse anything but a whole number from ``low`` to ``high`` (``unit``); return an int."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or value < low or (high is not None and value > high):
-        upward = "" if high is None else f" to {high}"
-        raise ConfigError(field, value, f"a whole number from {low}{upward}")
+        raise ConfigError(field, value, f"a whole number {_range(low, high, unit)}")
     return int(value)
 
 
 def check_numbers(
-    field: str, values: Any, length: int, low: float, high: float
+    field: str, values: Any, length: int, low: float, high: float, unit: str = ""
 ) -> tuple[float, ...]:
-    """Refuse anything but ``length`` numbers from ``low`` to ``high``."""
-    allowed = f"{length} numbers from {low:g} to {high:g}"
+    """Refuse anything but ``length`` numbers from ``low`` to ``high`` (``unit``)."""
+    allowed = f"{length} numbers {_range(low, high, unit)}"
     # An array without axes has no length.
     listed = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
     if not listed or len(values) != length:
@@ -65,9 +64,11 @@ def check_numbers(
         raise ConfigError(field, values, allowed) from None
 
 
-def check_range(field: str, values: Any, low: float, high: float) -> tuple[float, float]:
-    """Refuse anything but two numbers from ``low`` to ``high``, the lower one first."""
-    first, last = check_numbers(field, values, 2, low, high)
+def check_range(
+    field: str, values: Any, low: float, high: float, unit: str = ""
+) -> tuple[float, float]:
+    """Refuse anything but two numbers from ``low`` to ``high`` (``unit``), the lower first."""
+    first, last = check_numbers(field, values, 2, low, high, unit)
     if first > last:
         raise ConfigError(field, values, "the lower bound first")
     return first, last
@@ -85,19 +86,26 @@ def check_seed(seed: Any) -> int | None:
 
 
 def check_action(action: Any) -> NDArray[np.float64]:
-    """Refuse anything but three finite numbers in [-1, 1]; return them as float64."""
-    allowed = "three finite numbers in [-1, 1]"
+    """Refuse anything but three finite numbers; return them, clipped to [-1, 1], as float64."""
+    allowed = "three finite numbers, which are clipped to [-1, 1]"
     try:
         array = np.asarray(action)
     except ValueError:  # a ragged list
         raise ActionError("action", action, allowed) from None
     numbers = array.dtype.kind in "fiu"
-    if not numbers or array.shape != (3,) or not (np.abs(array) <= 1.0).all():
+    if not numbers or array.shape != (3,) or not np.isfinite(array).all():
         raise ActionError("action", action, allowed)
-    return array.astype(np.float64)
+    clipped: NDArray[np.float64] = np.clip(array, -1.0, 1.0).astype(np.float64)
+    return clipped
 
 
 def is_multiple(value: float, unit: float) -> bool:
     """Whether ``value`` is a positive whole multiple of ``unit``, to rounding."""
     ratio = value / unit
     return math.isclose(ratio, round(ratio), rel_tol=1e-9) and round(ratio) >= 1
+
+
+def _range(low: float, high: float | None, unit: str) -> str:
+    # A whole number is written out.
+    low_text, high_text = (f"{x:g}" if isinstance(x, float) else str(x) for x in (low, high))
+    return f"from {low_text}{'' if high is None else f' to {high_text}'} {unit}".rstrip()

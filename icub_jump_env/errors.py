@@ -2,15 +2,46 @@
 
 from __future__ import annotations
 
+import reprlib
 from typing import Any
+
+_LONGEST_VALUE = 500
+_LONGEST_MESSAGE = 2000
+"""Characters that are shown of a value, and of a message."""
+
+_values = reprlib.Repr()
+_values.maxlist = _values.maxtuple = _values.maxset = _values.maxfrozenset = 30
+_values.maxdict = 30
+_values.maxstring = _values.maxlong = _values.maxother = 200
+
+
+def printable(text: str) -> str:
+    """``text`` with whatever a terminal would obey, line breaks among them, as an escape."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def one_line(text: str, longest: int = _LONGEST_MESSAGE) -> str:
+    """``text`` as one printable line of at most ``longest`` characters."""
+    line = printable(" ".join(text[: 2 * longest].split()))
+    return line if len(line) <= longest else f"{line[: longest - 3]}..."
+
+
+def shown(value: Any) -> str:
+    """What a message shows of a value, whatever its ``repr`` does."""
+    try:
+        text = _values.repr(value)
+    except Exception:  # whatever its class does wrong: it is about to be refused
+        text = f"<{type(value).__name__}>"
+    return one_line(text, _LONGEST_VALUE)
 
 
 class ICubJumpError(Exception):
-    """Base class of all errors raised by icub_jump_env."""
+    """Base class of all errors raised by icub_jump_env; the message is one printable line."""
 
-
-_LONGEST = 1000
-"""Characters of a value that a message shows."""
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(message))
 
 
 class InvalidValueError(ICubJumpError, ValueError):
@@ -24,11 +55,10 @@ class InvalidValueError(ICubJumpError, ValueError):
 
     def __init__(self, field: str, value: Any = None, allowed: str | None = None) -> None:
         # Gymnasium's asynchronous vector environment re-raises with the message alone.
-        shown = repr(value)
-        if len(shown) > _LONGEST:
-            shown = f"{shown[:_LONGEST]}..."
         super().__init__(
-            field if allowed is None else f"{field}={shown} is not allowed: {allowed}"
+            field
+            if allowed is None
+            else f"{one_line(field, _LONGEST_VALUE)}={shown(value)} is not allowed: {allowed}"
         )
         self.field = field
         self.value = value
@@ -47,7 +77,7 @@ class UnknownFieldError(ConfigError, TypeError):
 
 
 class ActionError(InvalidValueError):
-    """An action has the wrong shape or type, or is not finite."""
+    """An action has the wrong shape or type, or a number that is not finite."""
 
 
 class CommandNotScalableError(ConfigError):
@@ -84,7 +114,8 @@ class PolicyMismatchError(ICubJumpError, ValueError):
 
     def __init__(self, differences: list[tuple[str, Any, Any]]) -> None:
         found = "; ".join(
-            f"{field}={ours!r} instead of {theirs!r}" for field, theirs, ours in differences
+            f"{field}={shown(ours)} instead of {shown(theirs)}"
+            for field, theirs, ours in differences
         )
         super().__init__(f"the environment is not the policy's: {found}")
         self.differences = differences

@@ -1,7 +1,8 @@
-"""Writing files: complete or not at all."""
+"""Writing files, complete or not at all, and reading JSON that others wrote."""
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -9,6 +10,34 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+MAX_DEPTH = 32
+"""Most lists and mappings inside one another in JSON that is read."""
+
+
+def read_json(text: str | bytes) -> Any:
+    """The content of JSON that anybody may have written.
+
+    Raises:
+        ValueError: If it is not JSON, or nested more than :data:`MAX_DEPTH` deep.
+    """
+    try:
+        content = json.loads(text)
+    except RecursionError:
+        deep = True
+    else:
+        deep = deeper(content, MAX_DEPTH)
+    if deep:
+        raise ValueError(f"nested more than {MAX_DEPTH} deep")
+    return content
+
+
+def deeper(value: Any, levels: int) -> bool:
+    """Whether more than ``levels`` lists and mappings lie inside one another."""
+    if not isinstance(value, Mapping | list | tuple):
+        return False
+    inner = value.values() if isinstance(value, Mapping) else value
+    return levels == 0 or any(deeper(item, levels - 1) for item in inner)
 
 
 def strict_json(content: Any, indent: int | None = None) -> str:
@@ -49,10 +78,25 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
             temporary.chmod(0o644)
         for temporary, path in temporaries.items():
             temporary.replace(path)
+            _sync_folder(path.parent)
     except BaseException:
         for temporary in temporaries:
             temporary.unlink(missing_ok=True)
         raise
+
+
+def _sync_folder(folder: Path) -> None:
+    """See that the names of files in it outlive a power cut, where the system can."""
+    if os.name == "nt":  # which cannot open a folder
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some file systems cannot
+            raise
+    finally:
+        os.close(descriptor)
 
 
 def _without_nan(value: Any) -> Any:

@@ -17,6 +17,7 @@ from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode, traced
+from icub_jump_env.evaluation.modes import nominal as nominal_mode
 
 # Where tests run in the background, Ctrl-C is ignored, also by the programs that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -38,8 +39,16 @@ def quiet() -> Console:
 
 @pytest.fixture(autouse=True)
 def in_temporary_folder(tmp_path, monkeypatch):
-    """MuJoCo writes MUJOCO_LOG.TXT into the working folder when a simulation diverges."""
+    """Evaluations keep their episodes in the working folder."""
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_repetitions():
+    """The nominal mode repeats its jumps less often."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nominal_mode, "REPETITIONS", 2)
+        yield
 
 
 ZERO = np.zeros(3, dtype=np.float32)

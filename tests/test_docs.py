@@ -6,13 +6,10 @@ import shlex
 from pathlib import Path
 
 import pytest
-from icub_jump_env.control.contact import ContactLimits
 
 from icub_jump_env import observation
-from icub_jump_env.control.jump import FLIGHT_MOTION_TIME
-from icub_jump_env.control.phases import ContactThresholds
-from icub_jump_env.control.torque import TorqueGains
-from icub_jump_env.control.velocity import VelocityGains
+from icub_jump_env.control.config import TorqueConfig, VelocityConfig
+from icub_jump_env.control.flight import FLIGHT_MOTION_TIME
 from icub_jump_env.evaluation import cli
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.simulation import tables
@@ -74,6 +71,27 @@ def test_the_readme_shows_the_table_once():
     assert readme.count("flight height (CoM), cm") == 1
 
 
+def test_help_runs_no_command(capsys, monkeypatch):
+    monkeypatch.setattr(update, "fresh", pytest.fail)
+    with pytest.raises(SystemExit) as end:
+        update.main(["--help"])
+    assert end.value.code == 0
+    assert "python docs/update.py" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as end:
+        update.main(["--hepl"])
+    assert end.value.code == 2
+
+
+def test_nothing_advises_to_install_the_package_from_an_index():
+    sources = [
+        file
+        for folder in ("icub_jump_env", "agents")
+        for file in (REPOSITORY / folder).rglob("*.py")
+    ]
+    for file in (*sources, *DOCUMENTS):
+        assert not re.search(r"pip install [^\n`]*icub-jump\b(?!-)", file.read_text()), file
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
 def test_every_command_of_eval_parses(document):
     text = document.read_text().replace("\\\n", " ")  # a command may go on in the next line
@@ -85,8 +103,8 @@ def test_every_command_of_eval_parses(document):
 
 def test_the_controller_page_states_the_gains_in_use():
     page = (REPOSITORY / "docs" / "controller.md").read_text()
-    velocity, torque, servo = VelocityGains(), TorqueGains(), ServoGains()
-    contact, thresholds = ContactLimits(), ContactThresholds()
+    velocity, torque, servo = VelocityConfig(), TorqueConfig(), ServoGains()
+    contact, phases = torque.contact, velocity.phases
     for statement in (
         f"weight {velocity.com_weight:.0e}".replace("e+0", "e"),
         f"weight {velocity.momentum_weight:.0e}".replace("e+0", "e"),
@@ -101,9 +119,10 @@ def test_the_controller_page_states_the_gains_in_use():
         f"torsion {contact.torsional_friction:g} m",
         f"at least {contact.minimum_force:g} N",
         f"({servo.stiffness:g} Nm/rad, {servo.damping:g} Nm s/rad)",
-        f"less than {thresholds.lift_off:g} N",
-        f"({thresholds.touch_down:g} N)",
+        f"less than {phases.lift_off:g} N",
+        f"({phases.touch_down:g} N)",
         f"motion of {FLIGHT_MOTION_TIME:g} s",
     ):
         assert statement in page, statement
     assert velocity.com == velocity.momentum
+    assert torque.phases == phases

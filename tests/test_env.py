@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import icub_jump_env
 from icub_jump_env import observation
+from icub_jump_env.control.phases import Phase
 from icub_jump_env.control.qp.problem import QPStatus
 
 
@@ -129,7 +130,7 @@ def test_info_of_every_step(env):
 def test_solver_failures_are_counted_and_shown():
     """Every other tick fails: the step's info shows the failure, not the success after it."""
     env = gymnasium.make("ICubJump-v0").unwrapped
-    checked = env._controller._launch._solver
+    checked = env._controller._controllers[Phase.LAUNCH]._controller.qp._solver
     solve, ticks = checked.solve, iter(range(1000))
 
     def flaky():
@@ -160,7 +161,7 @@ def test_each_axis_of_the_action_moves_the_com_its_way(axis, sign):
         coms.append(env.snapshot().com)
         env.close()
     shift = sign * (coms[1] - coms[0])[axis]
-    assert 0.5 * 0.4 * env.config.residual_scale[axis] < shift
+    assert 0.5 * 0.4 * env.config.residual.scale[axis] < shift
 
 
 def test_residual_moves_the_com_forward():

@@ -93,10 +93,29 @@ class TestNominalWorld:
         np.testing.assert_array_equal(states[0], states[2])
 
 
-@pytest.mark.parametrize("copier", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-@pytest.mark.parametrize("steps", [0, 20, 50, 70])
-def test_a_copy_continues_bit_for_bit(copier, steps):
-    env = gymnasium.make("ICubJump-v0", stand_time=0.2)
+def pickled(env):
+    return pickle.loads(pickle.dumps(env))
+
+
+@pytest.mark.parametrize(
+    ("config", "steps", "copier"),
+    [
+        *(({}, steps, copier) for steps in (0, 20, 50, 70) for copier in (copy.deepcopy, pickled)),
+        *(
+            (config, *moment)
+            for config in (
+                {"constraints": "hard", "residual_phases": "all"},
+                {"controller": "torque"},
+                {"controller": "torque", "constraints": "hard", "launch_end": "lift_off"},
+                {"robot": "iCubGenova02", "solver": "osqp"},
+            )
+            for moment in ((20, pickled), (40, copy.deepcopy), (50, pickled))
+        ),
+    ],
+    ids=lambda value: getattr(value, "__name__", str(value)),
+)
+def test_a_copy_continues_bit_for_bit(config, steps, copier):
+    env = gymnasium.make("ICubJump-v0", stand_time=0.1, **config)
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(steps):

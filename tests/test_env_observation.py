@@ -60,7 +60,7 @@ def test_observation_against_the_simulator_in_mid_launch():
     for _ in range(30):
         obs, *_ = env.step(np.array([0.1, -0.1, 0.1], np.float32))
     block, data, now = decoded(obs), env.data, env.snapshot()
-    crouch = env._crouch
+    crouch = env.robot.crouch
     assert block["time"] == pytest.approx(0.30)
     duration = block["takeoff_time"]
     assert duration == pytest.approx(0.11 / (0.28867 * math.sqrt(2 * 9.81 * 0.05)), rel=1e-3)
@@ -101,3 +101,17 @@ def test_no_privileged_state_in_the_observation():
         assert env.data.qpos[0] == pytest.approx(shift, abs=0.2)
         env.close()
     np.testing.assert_allclose(*observations, atol=1e-4)
+
+
+def test_the_com_error_is_zero_after_the_launch():
+    """The reference ends with the launch; what was left of the error must not stay."""
+    env = gymnasium.make("ICubJump-v0", stand_time=0.1).unwrapped
+    env.reset(seed=0)
+    seen, terminated = {"launch": [], "flight": [], "landing": []}, False
+    while not terminated:
+        obs, _, terminated, _, info = env.step(np.full(3, 0.1, np.float32))
+        seen[info["phase"]].append(decoded(obs)["com_error"])
+    assert np.abs(seen["launch"][-1]).max() > 1e-4
+    for phase in ("flight", "landing"):
+        assert len(seen[phase]) > 5
+        assert not np.any(seen[phase])

@@ -159,9 +159,9 @@ class TestEffects:
         env = make_env(JumpConfig.of(randomization=Randomization(encoder_bias=(0.015, 0.015))))
         _, info = env.reset(seed=0)
         bias = np.array(info["world"]["encoder_bias"])
-        shown = env._simulation.sensors.joint_position
+        shown = env._simulation.sensors.readings.joint_position
         np.testing.assert_allclose(env.data.qpos[7:] + bias, shown, atol=1e-12)
-        np.testing.assert_allclose(shown, env._crouch, atol=0.012)
+        np.testing.assert_allclose(shown, env.robot.crouch, atol=0.012)
 
     def test_both_sources_of_encoder_bias_show_and_servos_see_them(self):
         ranges = Randomization(encoder_bias=(0.01, 0.01))
@@ -170,10 +170,10 @@ class TestEffects:
         _, info = env.reset(seed=0)
         own = np.array(info["sensor_errors"]["joint_position"]["bias"])
         assert 0.001 < np.abs(own).max() <= 0.004
-        shown = env._simulation.sensors.joint_position
+        shown = env._simulation.sensors.readings.joint_position
         bias = np.array(info["world"]["encoder_bias"]) + own
         np.testing.assert_allclose(env.data.qpos[7:] + bias, shown, atol=1e-12)
-        np.testing.assert_allclose(shown, env._crouch, atol=0.012)
+        np.testing.assert_allclose(shown, env.robot.crouch, atol=0.012)
 
     def test_sensor_noise_is_that_of_the_realistic_sensors(self):
         env = make_env(JumpConfig.of(randomization=Randomization(sensor_noise=(1.0, 1.0))))
@@ -181,7 +181,7 @@ class TestEffects:
         sensors, errors = env._simulation.sensors, []
         for _ in range(200):
             sensors.read()
-            errors.append(sensors.joint_velocity - env.data.qvel[6:])
+            errors.append(sensors.readings.joint_velocity - env.data.qvel[6:])
         expected = SENSORS["realistic"].joint_velocity.noise
         assert np.std(errors) == pytest.approx(expected, rel=0.05)
         assert env._simulation.sensors.drawn()["gyro"]["bias"] == (0.0, 0.0, 0.0)
@@ -218,7 +218,7 @@ class TestEffects:
             ranges = Randomization(joint_gain=(gain, gain), payload_mass=(3.0, 3.0))
             env = make_env(JumpConfig.of(randomization=ranges))
             env.reset(seed=0)
-            errors.append(np.abs(env.data.qpos[7:] - env._crouch).max())
+            errors.append(np.abs(env.data.qpos[7:] - env.robot.crouch).max())
         assert errors[0] > 1.3 * errors[1]
 
     def test_friction_acts_in_full_while_a_motor_brakes_at_its_limit(self):
@@ -238,7 +238,7 @@ class TestEffects:
         env = make_env(JumpConfig.of(randomization=Randomization(slope=(slope, slope))))
         env.reset(seed=0)
         base_pitch = env.snapshot().base_pitch
-        gravity = env._simulation.sensors.gravity
+        gravity = env._simulation.sensors.readings.gravity
         # Uphill: gravity points backward in a frame that leans with the floor.
         assert np.arctan2(gravity[0], -gravity[2]) == pytest.approx(base_pitch - slope, abs=1e-6)
 

@@ -8,17 +8,21 @@ from pathlib import Path
 
 import pytest
 
+from icub_jump_env.policy import shipped_policies
+
 REPOSITORY = Path(__file__).parents[1]
 PACKAGE = REPOSITORY / "icub_jump_env"
 
 # Each layer may import itself and the layers after it.
 LAYERS = (
-    ("evaluation",),
+    ("evaluation", "cli"),
     ("env",),
     ("policy",),
-    ("reward", "config", "observation", "snapshot"),
-    ("control", "simulation"),
-    ("estimation", "reference", "metrics"),
+    ("config", "observation", "snapshot"),
+    ("shortcuts",),
+    ("reward", "simulation"),
+    ("control",),
+    ("estimation", "planning", "metrics"),
     ("robot",),
     ("checks", "files"),
     ("errors",),
@@ -31,12 +35,13 @@ def imports(file):
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        elif isinstance(node, ast.ImportFrom) and not node.level:
             yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 FILES = sorted(PACKAGE.rglob("*.py"))
+AGENTS = sorted((REPOSITORY / "agents").glob("*.py"))
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
@@ -87,6 +92,18 @@ def test_importing_registers_and_loads_nothing_heavy():
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
+def test_the_default_environment_loads_no_osqp():
+    program = (
+        "import sys, gymnasium, icub_jump_env\n"
+        "assert not {'osqp', 'joblib'} & set(sys.modules)\n"
+        "gymnasium.make('ICubJump-v0').reset(seed=0)\n"
+        "assert not {'osqp', 'joblib'} & set(sys.modules)\n"
+        "gymnasium.make('ICubJump-v0', solver='osqp')\n"
+        "assert 'osqp' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
@@ -115,17 +132,80 @@ def test_wheel_ships_the_package_alone(wheel):
     assert not [name for name in names if Path(name).suffix in (".stl", ".urdf", ".dae", ".png")]
 
 
-def test_installed_wheel_jumps(wheel, tmp_path):
-    """The wheel, not the checkout: unpacked elsewhere and found first."""
-    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
-    program = (
+def test_wheel_ships_the_agents_the_policies_and_the_command(wheel):
+    content = zipfile.ZipFile(wheel)
+    names = set(content.namelist())
+    agents = {f"icub_jump_env/agents/{file.name}" for file in AGENTS}
+    assert agents == {
+        name for name in names if name.startswith("icub_jump_env/agents/") and name.endswith(".py")
+    }
+    folder = "icub_jump_env/policy/shipped"
+    assert {name for name in names if name.startswith(folder)} == {
+        f"{folder}/{policy}.{suffix}"
+        for policy in shipped_policies()
+        for suffix in ("json", "safetensors")
+    }
+    (entries,) = [name for name in names if name.endswith("entry_points.txt")]
+    assert "icub-jump = icub_jump_env.cli:main" in content.read(entries).decode()
+
+
+@pytest.mark.parametrize("file", AGENTS, ids=lambda f: f.name)
+def test_agents_name_each_other_relatively(file):
+    """Their package is called otherwise in the wheel."""
+    assert not [name for name in imports(file) if name.split(".")[0] == "agents"]
+
+
+@pytest.fixture(scope="module")
+def site(wheel, tmp_path_factory):
+    """The wheel, unpacked."""
+    folder = tmp_path_factory.mktemp("site")
+    zipfile.ZipFile(wheel).extractall(folder)
+    return folder
+
+
+def run_installed(site, program):
+    """Run a program that finds the wheel, not the checkout."""
+    found = (
         "import sys\n"
-        f"sys.path.insert(0, {str(tmp_path / 'site')!r})\n"
-        "import gymnasium, icub_jump_env, numpy as np\n"
-        f"assert icub_jump_env.__file__.startswith({str(tmp_path)!r})\n"
+        f"sys.path.insert(0, {str(site)!r})\n"
+        "import icub_jump_env\n"
+        f"assert icub_jump_env.__file__.startswith({str(site)!r})\n"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", found + program], check=True, capture_output=True, text=True
+    )
+
+
+def test_installed_command_evaluates_and_trains(site):
+    names = [f"icub_jump_env.agents.{file.stem}" for file in AGENTS if file.stem != "__init__"]
+    program = (
+        "import importlib, importlib.util\n"
+        "from icub_jump_env import cli\n"
+        "from icub_jump_env.policy import load_policy\n"
+        "assert load_policy('torque').card.config.controller_name == 'torque'\n"
+        "for words in (['train', '--help'], ['eval', '--policy', 'torque', '--no-ankle-shift']):\n"
+        "    sys.argv[1:] = words\n"
+        "    try: cli.main()\n"
+        "    except SystemExit as end: print('exit code', end.code or 0)\n"
+        "assert 'torch' not in sys.modules\n"
+        f"for name in {names}:\n"
+        f"    assert importlib.import_module(name).__file__.startswith({str(site)!r})\n"
+        "assert 'agents' not in sys.modules\n"
+    )
+    result = run_installed(site, program)
+    trained, evaluated, _ = result.stdout.split("exit code ")
+    assert "--ppo.log-std" in trained
+    assert (evaluated.strip(), result.stdout.strip()[-1]) == ("0", "2")
+    assert result.stderr.startswith("error: torque: ")
+    assert "ankle_shift=False instead of True" in result.stderr
+
+
+def test_installed_wheel_jumps(site):
+    program = (
+        "import gymnasium, numpy as np\n"
         "env = gymnasium.make('ICubJump-v0', stand_time=0.2); env.reset(seed=0); done = False\n"
         "while not done:\n"
         "    *_, done, _, info = env.step(np.zeros(3, np.float32))\n"
         "assert info['is_success']\n"
     )
-    subprocess.run([sys.executable, "-c", program], check=True, cwd=tmp_path)
+    run_installed(site, program)

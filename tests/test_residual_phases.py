@@ -5,16 +5,17 @@ import pytest
 from conftest import ZERO, jump
 
 from icub_jump_env import JumpConfig
-from icub_jump_env.control.jump import RESIDUAL_TIME
 from icub_jump_env.control.phases import Phase
 from icub_jump_env.evaluation.episodes.rollout import make_env
+from icub_jump_env.planning.residual import RESIDUAL_TIME
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 SHIFT = np.array([0.4, 0.2, -0.5], np.float32)
 
 
 def after_the_launch(action, phases, stand_time=0.4):
     """Observations and costs of an episode whose launch is the baseline's."""
-    env = make_env(JumpConfig.of(stand_time=stand_time, residual_phases=phases))
+    env = make_env(JumpConfig().replace(stand_time=stand_time, residual_phases=phases))
     env.reset(seed=0)
     observations, costs, terminated, phase = [], [], False, "launch"
     while not terminated:
@@ -49,23 +50,19 @@ def test_in_all_phases_later_actions_move_the_robot_and_cost():
 
 def test_the_posture_follows_the_residual_to_the_shift_of_the_com():
     """At rest the joints have moved as far as it takes to shift the CoM over resting feet."""
-    env = make_env(JumpConfig.of(residual_phases="all"))
+    env = make_env(JumpConfig().replace(residual_phases="all"))
     env.reset(seed=0)
-    controller, sensors = env._controller, env._simulation.sensors
-    controller.phases.phase = Phase.LANDING
+    controller, state = env._controller, env._state
+    for tick, force in enumerate((0.0, 0.0, 150.0)):
+        state.foot_force = np.full(2, force)
+        controller.tick(state, 0.005 * tick, np.zeros(3))
+    assert controller.phases.phase is Phase.LANDING
     commands = []
     for target in (np.zeros(3), np.array([0.01, 0.004, -0.01])):
-        for tick in range(400):
-            tick = controller.tick(
-                1.0 + 0.005 * tick,
-                env._estimator,
-                sensors.joint_position,
-                sensors.joint_velocity,
-                300.0,
-                target,
-            )
+        for count in range(400):
+            tick = controller.tick(state, 1.0 + 0.005 * count, target)
         commands.append(tick.command.position.copy())
-    kinematics = env._estimator.kinematics
+    kinematics = FeetFixedKinematics(env.robot)
     coms = []
     for posture in commands:
         kinematics.update(posture)

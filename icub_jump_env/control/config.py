@@ -50,10 +50,15 @@ class PhaseConfig:
 
     def __post_init__(self) -> None:
         check_choice("launch_end", self.launch_end, get_args(LaunchEnd))
-        store(self, lift_off=check_number("lift_off", self.lift_off, 0.0, 1e4))
+        store(self, lift_off=check_number("lift_off", self.lift_off, 0.0, 1e4, "N"))
         # Below the lift-off force, a robot about to take off would count as landed.
-        store(self, touch_down=check_number("touch_down", self.touch_down, self.lift_off, 1e4))
-        store(self, lift_off_ticks=check_count("lift_off_ticks", self.lift_off_ticks, 1))
+        store(
+            self, touch_down=check_number("touch_down", self.touch_down, self.lift_off, 1e4, "N")
+        )
+        store(
+            self,
+            lift_off_ticks=check_count("lift_off_ticks", self.lift_off_ticks, 1, unit="ticks"),
+        )
 
 
 @dataclass(frozen=True)
@@ -77,9 +82,9 @@ class ContactConfig:
     def __post_init__(self) -> None:
         _store_numbers(
             self,
-            friction=(0.0, 5.0),
-            torsional_friction=(0.0, 1.0),
-            minimum_force=(0.0, 1e3),
+            friction=(0.0, 5.0, ""),
+            torsional_friction=(0.0, 1.0, "m"),
+            minimum_force=(0.0, 1e3, "N"),
         )
 
 
@@ -107,7 +112,7 @@ class ControllerConfig:
     phases: PhaseConfig = field(default_factory=PhaseConfig)
 
     def __post_init__(self) -> None:
-        store(self, frequency=check_number("frequency", self.frequency, 1.0, 1e5))
+        store(self, frequency=check_number("frequency", self.frequency, 1.0, 1e5, "Hz"))
         check_choice("solver", self.solver, get_args(SolverName))
         check_choice("constraints", self.constraints, get_args(Constraints))
         store(self, momentum_control=check_flag("momentum_control", self.momentum_control))
@@ -153,13 +158,13 @@ class VelocityConfig(ControllerConfig):
         check_choice("kind", self.kind, ("velocity",))
         _store_numbers(
             self,
-            posture=(0.0, 1e3),
-            com=(0.0, 1e3),
-            momentum=(0.0, 1e3),
-            com_weight=(0.0, 1e8),
-            momentum_weight=(0.0, 1e8),
-            limit_horizon=(0.0, 1.0),
-            velocity_margin=(0.01, 1.0),
+            posture=(0.0, 1e3, "1/s"),
+            com=(0.0, 1e3, "1/s"),
+            momentum=(0.0, 1e3, "1/s"),
+            com_weight=(0.0, 1e8, ""),
+            momentum_weight=(0.0, 1e8, ""),
+            limit_horizon=(0.0, 1.0, "s"),
+            velocity_margin=(0.01, 1.0, ""),
         )
         # One of the two must be positive, or the QP has no unique solution.
         _store_weights(self, posture_weight=(1e-6, 1e6), smoothness_weight=(0.0, 1e6))
@@ -177,7 +182,7 @@ class TorqueConfig(ControllerConfig):
         momentum: K of the momentum constraint (1/s).
         posture_weight: Diagonal of Lambda ((rad/s^2)^-2): of legs, torso and arms, or per
             joint.
-        continuity_weight: Diagonal of Delta (Nm^-2), likewise.
+        smoothness_weight: Diagonal of Delta (Nm^-2), likewise.
         com_weight: Weight of the CoM task's residual ((m/s^2)^-2), if soft.
         momentum_weight: Weight of the momentum residual (Nm^-2), if soft.
         wrench_weight: Weight of the contact wrenches (N^-2, (Nm)^-2); makes their
@@ -199,7 +204,7 @@ class TorqueConfig(ControllerConfig):
     com_damping: float = 28.0
     momentum: float = 10.0
     posture_weight: Weights = (1.0, 1.0, 0.1)
-    continuity_weight: Weights = (1e-3, 1e-3, 1e-3)
+    smoothness_weight: Weights = (1e-3, 1e-3, 1e-3)
     com_weight: float = 1e4
     momentum_weight: float = 3e3
     wrench_weight: float = 1e-4
@@ -213,24 +218,24 @@ class TorqueConfig(ControllerConfig):
         check_choice("kind", self.kind, ("torque",))
         _store_numbers(
             self,
-            posture_stiffness=(0.0, 1e5),
-            posture_damping=(0.0, 1e5),
-            com_stiffness=(0.0, 1e5),
-            com_damping=(0.0, 1e5),
-            momentum=(0.0, 1e3),
-            com_weight=(0.0, 1e8),
-            momentum_weight=(0.0, 1e8),
-            wrench_weight=(1e-9, 1.0),
-            speed_horizon=(1e-3, 1.0),
-            limit_horizon=(1e-3, 1.0),
+            posture_stiffness=(0.0, 1e5, "1/s^2"),
+            posture_damping=(0.0, 1e5, "1/s"),
+            com_stiffness=(0.0, 1e5, "1/s^2"),
+            com_damping=(0.0, 1e5, "1/s"),
+            momentum=(0.0, 1e3, "1/s"),
+            com_weight=(0.0, 1e8, ""),
+            momentum_weight=(0.0, 1e8, ""),
+            wrench_weight=(1e-9, 1.0, ""),
+            speed_horizon=(1e-3, 1.0, "s"),
+            limit_horizon=(1e-3, 1.0, "s"),
         )
-        _store_weights(self, posture_weight=(1e-6, 1e6), continuity_weight=(0.0, 1e6))
+        _store_weights(self, posture_weight=(1e-6, 1e6), smoothness_weight=(0.0, 1e6))
         check_type("contact", self.contact, ContactConfig)
 
 
-def _store_numbers(config: Any, **ranges: tuple[float, float]) -> None:
-    for name, (low, high) in ranges.items():
-        store(config, **{name: check_number(name, getattr(config, name), low, high)})
+def _store_numbers(config: Any, **ranges: tuple[float, float, str]) -> None:
+    for name, (low, high, unit) in ranges.items():
+        store(config, **{name: check_number(name, getattr(config, name), low, high, unit)})
 
 
 def _store_weights(config: Any, **ranges: tuple[float, float]) -> None:

@@ -105,16 +105,14 @@ class VelocityController:
         error = state.angular_momentum - setpoint.angular_momentum
         error *= self._dt
         self._integral += error
-        qp = self.qp
-        solution, self.report = qp.solve(state, setpoint)
+        solution, self.report = self.qp.solve(state, setpoint)
         solved = not self.report.failed
         if not solved and self._fallback is not None:
-            qp = self._fallback
-            solution, report = qp.solve(state, setpoint)
+            solution, report = self._fallback.solve(state, setpoint)
             solved = not report.failed
         # Keeping on is the best guess when the solver has none. The limits take the
         # last rounding error off a solution; fmin and fmax pass over NaN limits.
-        command, problem = self._previous, qp.problem
+        command, problem = self._previous, self.qp.problem
         if solved:
             command[:] = solution.x
         np.fmin(command, problem.upper[: problem.n], out=command)

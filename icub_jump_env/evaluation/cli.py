@@ -18,8 +18,9 @@ import tyro
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import ICubJumpError, PolicyMismatchError
+from icub_jump_env.errors import ICubJumpError, PolicyMismatchError, one_line, shown
 from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.files import read_json
 from icub_jump_env.simulation.opengl import import_mujoco
 
 T = TypeVar("T")
@@ -46,9 +47,10 @@ def _name_or_json(
         if words[0] in names:
             return words[0]
         try:
-            return json.loads(words[0])
-        except json.JSONDecodeError:
-            raise ValueError(f"{words[0]} is none of {', '.join(names)}, nor JSON") from None
+            return read_json(words[0])
+        except ValueError as error:
+            told = f"none of {', '.join(names)}, nor readable as JSON ({error})"
+            raise ValueError(f"{shown(words[0])} is {told}") from None
 
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs=1,
@@ -176,7 +178,7 @@ def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
 
 
 def _one_line(complaint: str) -> str:
-    """The message inside tyro's box, without frame, title and advice."""
+    """The message inside tyro's box, without frame, title and advice but for similar flags."""
     lines = [line.strip("╭╮╰╯│─ ") for line in complaint.splitlines()]
     message = []
     for line in lines[1:]:
@@ -184,9 +186,15 @@ def _one_line(complaint: str) -> str:
             break
         message.append(line)
     # tyro says so where a dataclass itself refused; the user knows no dataclass.
-    return re.sub(r"^Error parsing \w*Options: ", "", " ".join(message)) or "bad arguments"
+    text = re.sub(r"^Error parsing \w*Options: ", "", " ".join(message)) or "bad arguments"
+    if text.startswith("Unrecognized options"):
+        # Sorted: tyro has them in any order.
+        similar = sorted(set(re.findall(r"^│ {5}(--[\w.-]+)", complaint, re.MULTILINE)))
+        if similar:
+            text += f"; did you mean {' or '.join(similar)}?"
+    return text
 
 
 def _fail(message: str) -> NoReturn:
-    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"error: {one_line(message)}", file=sys.stderr)
     sys.exit(USAGE_ERROR)

@@ -10,8 +10,9 @@ from typing import Annotated, Literal
 import tyro
 
 from icub_jump_env.checks import check_count, store
-from icub_jump_env.config import JumpConfig, Shortcuts
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.shortcuts import Shortcuts
 
 STUDY_EPISODES = 20
 """Episodes of each case of a study."""
@@ -92,7 +93,7 @@ class EvalOptions:
         if self.episodes is not None:
             check_count("episodes", self.episodes, 1, MOST_EPISODES)
         check_count("seed", self.seed, 0)
-        check_count("jobs", self.jobs, 1)
+        check_count("jobs", self.jobs, 1, unit="processes")
         chosen = [mode for mode in _MODES if getattr(self, mode)]
         if len(chosen) > 1:
             raise ConfigError(chosen[0], getattr(self, chosen[0]), f"not with --{chosen[1]}")

@@ -43,9 +43,9 @@ class SuccessConfig:
     stand_time: float = 2.0
 
     def __post_init__(self) -> None:
-        store(self, flight_time=check_number("flight_time", self.flight_time, 0.0, 1.0))
+        store(self, flight_time=check_number("flight_time", self.flight_time, 0.0, 1.0, "s"))
         store(self, height_ratio=check_number("height_ratio", self.height_ratio, 0.0, 2.0))
-        store(self, stand_time=check_number("stand_time", self.stand_time, 0.0, 30.0))
+        store(self, stand_time=check_number("stand_time", self.stand_time, 0.0, 30.0, "s"))
 
 
 class _Undefined(float):

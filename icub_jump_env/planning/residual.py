@@ -44,9 +44,12 @@ class ResidualConfig:
     bandwidth: float = 15.0
 
     def __post_init__(self) -> None:
-        store(self, scale=check_numbers("residual.scale", self.scale, 3, *RESIDUAL_RANGE))
-        check_choice("residual.phases", self.phases, get_args(ResidualPhases))
-        store(self, bandwidth=check_number("residual.bandwidth", self.bandwidth, 1.0, 1000.0))
+        store(self, scale=check_numbers("scale", self.scale, 3, *RESIDUAL_RANGE, "m"))
+        check_choice("phases", self.phases, get_args(ResidualPhases))
+        store(
+            self,
+            bandwidth=check_number("bandwidth", self.bandwidth, 1.0, 1000.0, "rad/s"),
+        )
 
 
 class ResidualFilter:
@@ -78,9 +81,13 @@ class ResidualFilter:
         """Advance by ``dt`` seconds towards ``target`` ((3,) m)."""
         w = self._bandwidth
         decay = math.exp(-w * dt)
-        error = self.offset - target
-        slope = self.velocity + w * error
-        error_next = (error + slope * dt) * decay
-        self.velocity[:] = slope * decay - w * error_next
-        self.offset[:] = target + error_next
-        self.acceleration[:] = -w * w * error_next - 2 * w * self.velocity
+        # Three numbers at each control tick: floats take a third of the time of arrays.
+        now = zip(target.tolist(), self.offset.tolist(), self.velocity.tolist(), strict=True)
+        for axis, (goal, offset, velocity) in enumerate(now):
+            error = offset - goal
+            slope = velocity + w * error
+            error_next = (error + slope * dt) * decay
+            velocity = slope * decay - w * error_next
+            self.velocity[axis] = velocity
+            self.offset[axis] = goal + error_next
+            self.acceleration[axis] = -w * w * error_next - 2 * w * velocity

@@ -7,6 +7,7 @@ displacement or a final acceleration of -g.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -47,12 +48,12 @@ class NormalizedCurve:
     order: int
     end_slope: float
 
-    @property
+    @functools.cached_property
     def a(self) -> float:
         """Coefficient of u^n."""
         return self.order + 1 - self.end_slope
 
-    @property
+    @functools.cached_property
     def b(self) -> float:
         """Coefficient of u^(n+1)."""
         return self.end_slope - self.order
@@ -112,7 +113,7 @@ class ComTrajectory:
     takeoff_velocity: float
     duration: float
 
-    @property
+    @functools.cached_property
     def displacement(self) -> float:
         """CoM rise during the launching phase (m)."""
         return self.takeoff_velocity * self.duration * self.curve.position(1.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Self, get_args
 
 from icub_jump_env.checks import check_choice, check_count, check_number, check_seed, store
-from icub_jump_env.config import JumpConfig, group_of
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy.fields import (
@@ -26,6 +26,7 @@ from icub_jump_env.policy.fields import (
     check_versions,
 )
 from icub_jump_env.robot.urdf import DEFAULT_MODEL
+from icub_jump_env.shortcuts import path_to
 
 FORMAT = 1
 """Format of the files that this version reads and writes."""
@@ -99,7 +100,9 @@ class PolicyCard:
             inputs=check_inputs(self.inputs, dict(observation)),
             hidden=check_hidden(self.hidden),
             axes=check_axes(self.axes),
-            action_scale=check_number("action_scale", self.action_scale, *ACTION_SCALE_RANGE),
+            action_scale=check_number(
+                "action_scale", self.action_scale, *ACTION_SCALE_RANGE, "of the largest action"
+            ),
             config=_check_config(self.config),
             versions=check_versions(self.versions),
             command=check_command(self.command),
@@ -166,6 +169,17 @@ def _check_config(config: Any) -> JumpConfig:
     checked = JumpConfig.of(**explicit)
     for field in TASK_FIELDS:
         # Else the policy would change with the default.
-        if field not in explicit and group_of(field) not in explicit:
+        if field not in explicit and not _holds(explicit, path_to(field)):
             raise ConfigError("config", sorted(config), f"a configuration with {field}")
     return checked
+
+
+def _holds(values: Any, path: tuple[str, ...]) -> bool:
+    """Whether nested mappings go on to the end of a path; a preset's name stands for all of it."""
+    for step in path:
+        if not isinstance(values, Mapping):
+            return True
+        if step not in values:
+            return False
+        values = values[step]
+    return True

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_count, check_number
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.files import MAX_DEPTH, deeper
 
 PolicyKind = Literal["network", "replay"]
 AxisName = Literal["forward", "lateral", "vertical"]
@@ -57,7 +58,7 @@ def check_hidden(hidden: Any) -> tuple[int, ...]:
     """Refuse anything but the widths of at most :data:`MAX_HIDDEN` layers."""
     if not isinstance(hidden, list | tuple) or len(hidden) > MAX_HIDDEN:
         raise ConfigError("hidden", hidden, f"the widths of at most {MAX_HIDDEN} layers")
-    return tuple(check_count("hidden", width, 1, MAX_WIDTH) for width in hidden)
+    return tuple(check_count("hidden", width, 1, MAX_WIDTH, "neurons") for width in hidden)
 
 
 def check_array(
@@ -124,11 +125,17 @@ def check_command(words: Any) -> tuple[str, ...]:
 
 def check_results(field: str, value: Any) -> Any:
     """Refuse anything but numbers, None, and lists and mappings of them."""
+    if deeper(value, MAX_DEPTH):
+        raise ConfigError(field, value, f"nested at most {MAX_DEPTH} deep")
+    return _check_results(field, value)
+
+
+def _check_results(field: str, value: Any) -> Any:
     if isinstance(value, Mapping):
         return {
-            check_name(field, name): check_results(f"{field}.{name}", item)
+            check_name(field, name): _check_results(f"{field}.{name}", item)
             for name, item in value.items()
         }
     if isinstance(value, list | tuple):
-        return tuple(check_results(field, item) for item in value)
+        return tuple(_check_results(field, item) for item in value)
     return None if value is None else check_number(field, value, -_RESULT_LIMIT, _RESULT_LIMIT)

@@ -8,7 +8,6 @@ another's card.
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,10 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from icub_jump_env.errors import PolicyFileError
-from icub_jump_env.files import strict_json, write_files
+from icub_jump_env.files import MAX_DEPTH, deeper, read_json, strict_json, write_files
 
 MAX_CARD_SIZE = 2**20
 """Largest card (bytes)."""
-
-MAX_CARD_DEPTH = 32
-"""Most lists and mappings inside one another in a card."""
 
 
 def save_tensors(path: Path, tensors: Mapping[str, NDArray[Any]], card: Mapping[str, Any]) -> None:
@@ -49,6 +45,8 @@ def save_tensors(path: Path, tensors: Mapping[str, NDArray[Any]], card: Mapping[
         content = save(rows)
     except SafetensorError as error:
         raise PolicyFileError(str(tensor_file), str(error)) from None
+    if deeper(card, MAX_DEPTH):
+        raise PolicyFileError(str(card_file), f"nested more than {MAX_DEPTH} deep")
     text = strict_json({**card, "sha256": _hash(content)}, indent=2) + "\n"
     _parse(card_file, text.encode())
     write_files({tensor_file: content, card_file: text.encode()})
@@ -107,19 +105,9 @@ def _parse(path: Path, text: bytes) -> dict[str, Any]:
     if len(text) > MAX_CARD_SIZE:
         raise PolicyFileError(str(path), f"larger than {MAX_CARD_SIZE} bytes")
     try:
-        card = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise PolicyFileError(str(path), f"not JSON ({error})") from None
+        card = read_json(text)
+    except ValueError as error:
+        raise PolicyFileError(str(path), f"not readable as JSON ({error})") from None
     if not isinstance(card, dict):
         raise PolicyFileError(str(path), "not a JSON object")
-    if _deeper(card, MAX_CARD_DEPTH):
-        raise PolicyFileError(str(path), f"nested more than {MAX_CARD_DEPTH} deep")
     return card
-
-
-def _deeper(value: Any, levels: int) -> bool:
-    """Whether more than ``levels`` lists and mappings lie inside one another."""
-    if not isinstance(value, dict | list):
-        return False
-    inner = value.values() if isinstance(value, dict) else value
-    return levels == 0 or any(_deeper(item, levels - 1) for item in inner)

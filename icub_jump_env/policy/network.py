@@ -59,7 +59,9 @@ class NetworkPolicy:
     def __post_init__(self) -> None:
         entries = list(entry_scales())
         store(self, inputs=check_inputs(self.inputs, entries), axes=check_axes(self.axes))
-        scale = check_number("action_scale", self.action_scale, *ACTION_SCALE_RANGE)
+        scale = check_number(
+            "action_scale", self.action_scale, *ACTION_SCALE_RANGE, "of the largest action"
+        )
         store(self, action_scale=scale, layers=self._checked_layers())
         store(self, _columns=np.array([entries.index(name) for name in self.inputs], np.intp))
         store(self, _rows=np.array([AXES.index(axis) for axis in self.axes], np.intp))

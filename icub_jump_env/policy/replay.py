@@ -66,7 +66,7 @@ class ReplayPolicy:
             commands=commands,
             actions=check_array("actions", self.actions, (n_commands, n_steps, 3), 1.0),
             agent_frequency=check_number(
-                "agent_frequency", self.agent_frequency, *AGENT_FREQUENCY_RANGE
+                "agent_frequency", self.agent_frequency, *AGENT_FREQUENCY_RANGE, "Hz"
             ),
         )
 

@@ -109,9 +109,8 @@ class Robot:
         return load_robot, (self.name, self.ankle_shift)
 
 
-@functools.cache
 def load_robot(name: str = DEFAULT_MODEL, ankle_shift: bool = True) -> Robot:
-    """The iCub called ``name``.
+    """The iCub called ``name``, always the same object.
 
     Limits are those of its URDF; where that has a placeholder, the assumptions of
     :func:`icub_jump_env.robot.icub.assumed_limits`.
@@ -129,6 +128,11 @@ def load_robot(name: str = DEFAULT_MODEL, ankle_shift: bool = True) -> Robot:
         if name in icub.UNPHYSICAL_MODELS:
             allowed += "; the URDF of this first-generation robot has unphysical inertias"
         raise ConfigError("robot", name, allowed)
+    return _load(name, ankle_shift)
+
+
+@functools.cache
+def _load(name: str, ankle_shift: bool) -> Robot:
     joints = {
         joint.attrib["name"]: joint.find("limit")
         for joint in ET.fromstring(load_urdf(name, ankle_shift)).findall("joint")

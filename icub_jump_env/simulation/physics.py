@@ -41,6 +41,7 @@ class Physics:
         self._bind()
 
     def _bind(self) -> None:
+        _silence_mujoco()
         data = self.data
         self.joint_position = data.qpos[7:]
         self.joint_velocity = data.qvel[6:]
@@ -113,3 +114,14 @@ class Physics:
     def valid(self) -> bool:
         """Whether the state is finite and small enough to compute with."""
         return all(x.max() < _HUGE and x.min() > -_HUGE for x in (self._qpos, self._qvel))
+
+
+def _silence_mujoco() -> None:
+    """Keep MuJoCo from printing warnings and from writing them into the working folder.
+
+    For the whole process, as MuJoCo has it. ``data.warning`` counts them all the same, and a
+    callback set by ``mujoco.set_mju_user_warning`` is still called.
+    """
+    log = mujoco.MjLogConfig.get()
+    log.logto_console = log.logto_file = False
+    log.set()

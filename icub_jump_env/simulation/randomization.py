@@ -39,6 +39,14 @@ _ALLOWED: Mapping[str, Range] = MappingProxyType(
         "push": (-20.0, 20.0),
     }
 )
+_UNITS = {
+    "payload_mass": "kg",
+    "payload_offset": "m",
+    "delay": "ticks",
+    "slope": "rad",
+    "encoder_bias": "rad",
+    "push": "N s",
+}
 
 
 @dataclass(frozen=True)
@@ -88,7 +96,8 @@ class Randomization:
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             low, high = _ALLOWED[field.name]
-            values = check_range(field.name, getattr(self, field.name), low, high)
+            unit = _UNITS.get(field.name, "")
+            values = check_range(field.name, getattr(self, field.name), low, high, unit)
             store(self, **{field.name: values})
         if any(not bound.is_integer() for bound in self.delay):
             raise ConfigError("delay", self.delay, "whole numbers of control ticks")

@@ -41,8 +41,12 @@ class SensorError:
     drift: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("noise", "bias", "drift"):
-            store(self, **{name: check_number(name, getattr(self, name), 0.0, 1e4)})
+        for name, unit in (
+            ("noise", "units of the reading"),
+            ("bias", "units of the reading"),
+            ("drift", "units of the reading per s"),
+        ):
+            store(self, **{name: check_number(name, getattr(self, name), 0.0, 1e4, unit)})
 
 
 @dataclass(frozen=True)
@@ -76,8 +80,10 @@ class SensorConfig:
     def __post_init__(self) -> None:
         for name in ERROR_KINDS:
             check_type(name, getattr(self, name), SensorError)
-        store(self, force_gain=check_number("force_gain", self.force_gain, 0.0, 1.0))
-        store(self, delay=check_count("delay", self.delay, 0, MAX_DELAY))
+        store(
+            self, force_gain=check_number("force_gain", self.force_gain, 0.0, 1.0, "of the force")
+        )
+        store(self, delay=check_count("delay", self.delay, 0, MAX_DELAY, "control ticks"))
 
     def with_noise_of(self, other: SensorConfig, share: float) -> SensorConfig:
         """The same with a ``share`` of another configuration's noise on top (variances add)."""

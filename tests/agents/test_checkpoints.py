@@ -5,6 +5,7 @@ import dataclasses
 import errno
 import os
 import random
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from troubled_env import TroubledEnv
 
+from agents import checkpoints
 from agents.checkpoints import (
     CheckpointError,
     begin_segment,
@@ -24,6 +26,7 @@ from agents.checkpoints import (
     save_checkpoint,
 )
 from agents.vec_env import JumpVecEnv
+from icub_jump_env.policy.files import load_tensors, save_tensors
 
 SEED = 20190425
 STEPS = 64
@@ -239,6 +242,63 @@ def test_the_previous_one_is_used_if_the_newest_is_damaged(folder, damage):
     assert "\n" not in line
 
 
+def rewrite(folder, called=5, tensors=(), **fields):
+    """A checkpoint whose files fit together, with some of its content exchanged."""
+    path = folder / f"checkpoint-{called:06d}.safetensors"
+    arrays, card = load_tensors(folder / "checkpoint-000005.safetensors")
+    del card["sha256"]
+    card |= fields
+    arrays |= dict(tensors) | {checkpoints._FINGERPRINT: checkpoints._fingerprint(card)}
+    save_tensors(path, arrays, card)
+
+
+BIAS = "policy.action_net.bias"
+CONTENTS = {
+    "of another number": ({"number": 4}, "number=4 is not allowed: 5, as the file is called"),
+    "no number": ({"number": True}, "number=True"),
+    "negative steps": ({"num_timesteps": -1}, "num_timesteps=-1"),
+    "steps as text": ({"num_timesteps": "9"}, "num_timesteps='9'"),
+    "half an update": ({"n_updates": 0.5}, "n_updates=0.5"),
+    "no progress": ({"progress": [1]}, r"progress=\[1\]"),
+    "no groups": ({"param_groups": 3}, "param_groups=3"),
+    "groups of nothing": ({"param_groups": [3]}, r"param_groups=\[3\]"),
+    "another version": ({"wings": 2}, "of another version"),
+    "NaN": (
+        {"tensors": {BIAS: np.array([np.nan], np.float32)}},
+        rf"{BIAS}=nan .*: finite numbers",
+    ),
+    "infinity": ({"tensors": {"optimizer.0.step": np.float32(np.inf)}}, "optimizer.0.step=inf"),
+    "doubles": ({"tensors": {BIAS: np.zeros(1)}}, f"{BIAS}='float64' is not allowed: float32"),
+    "other tensors": ({"tensors": {"wings": np.zeros(1, np.float32)}}, "tensors='wings'"),
+}
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+def test_the_previous_one_is_used_if_the_newest_is_none(folder, content):
+    changes, message = CONTENTS[content]
+    rewrite(folder, **changes)
+    said = []
+    assert load_latest(folder, said.append).number == 4
+    (line,) = said
+    assert re.search(rf"checkpoint-000005\.json: .*{message}", line)
+
+
+def test_one_called_by_another_number_is_passed_over(folder):
+    rewrite(folder, 6)
+    said = []
+    assert load_latest(folder, said.append).number == 5
+    assert "number=5 is not allowed: 6, as the file is called" in said[0]
+
+
+def test_one_that_is_too_large_is_passed_over(folder, monkeypatch):
+    size = (folder / "checkpoint-000005.safetensors").stat().st_size
+    rewrite(folder, tensors={"policy.large": np.zeros(99, np.float32)})
+    monkeypatch.setattr(checkpoints, "MAX_CHECKPOINT_SIZE", size)
+    said = []
+    assert load_latest(folder, said.append).number == 4
+    assert f"larger than {size} bytes" in said[0]
+
+
 def test_all_damaged_is_an_error_that_names_them(folder):
     for path in folder.glob("*.safetensors"):
         truncate(path)
@@ -280,11 +340,26 @@ def test_another_architecture_is_refused(envs, folder):
     [
         {"tensors": {"nonsense": np.zeros(1)}},
         {"tensors": {"optimizer.first.step": np.zeros(1)}},
+        {"tensors": {"optimizer": np.zeros(1)}},
+        {"tensors": {"optimizer.99.step": np.zeros(())}},
+        {"tensors": {"optimizer.0.step": np.zeros(1)}},
+        {"tensors": {"optimizer.0.exp_avg": np.zeros((1, 1))}},
         {"param_groups": [{}]},
+        {"param_groups": []},
         {"param_groups": None},
+        {"lr": float("nan")},
+        {"lr": None},
+        {"lr": "fast"},
+        {"betas": [0.9, float("inf")]},
     ],
 )
 def test_one_made_by_hand_that_lacks_something_is_refused(envs, folder, change):
-    checkpoint = dataclasses.replace(load_latest(folder, pytest.fail), **change)
+    checkpoint = load_latest(folder, pytest.fail)
+    (group,) = checkpoint.param_groups
+    if "tensors" in change:
+        change = {"tensors": checkpoint.tensors | change["tensors"]}
+    elif "param_groups" not in change:
+        change = {"param_groups": [group | change]}
+    checkpoint = dataclasses.replace(checkpoint, **change)
     with pytest.raises(CheckpointError, match=r"^checkpoint 5 does not fit the model: .*$"):
         restore(make_model(envs, seed=3), checkpoint)

@@ -84,6 +84,13 @@ def test_actions_are_scaled():
     assert ours[1] != launch(whole, np.full((STEPS, 1), 0.8, np.float32))[1]
 
 
+def test_actions_beyond_one_are_clipped_before_they_are_scaled():
+    env = LaunchEnv(CONFIG, SOME, ("forward",))
+    env.scale_actions(0.25)
+    ours = launch(env, np.full((STEPS, 1), 2.0, np.float32))
+    assert ours[1:] == launch(env, np.ones((STEPS, 1), np.float32))[1:]
+
+
 def test_a_jump_that_is_over_before_takes_as_many_steps():
     """Shifted sideways by 10 cm the robot falls in the launch."""
     config = JumpConfig.of(jump_height=0.02, residual_scale=(0.1, 0.1, 0.1))

@@ -7,9 +7,12 @@ from tiny_run import UNUSUAL
 
 from agents.options import TASK, PPOOptions, TrainOptions, read_options
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import TorqueConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.report.output import write_json
 from icub_jump_env.observation import entry_scales
+from icub_jump_env.planning.residual import ResidualConfig
+from icub_jump_env.shortcuts import Shortcuts
 
 
 @pytest.mark.parametrize("options", [TrainOptions(), UNUSUAL], ids=["default", "unusual"])
@@ -25,6 +28,31 @@ def test_a_file_says_what_it_wants_and_the_task_the_rest(tmp_path):
     assert read_options(file) == TrainOptions(
         env=TASK.replace(controller="torque"), ppo=PPOOptions(epochs=3), seed=4
     )
+
+
+def test_a_file_without_groups_is_read(tmp_path):
+    """As files were before the configuration had groups."""
+    env = {
+        "jump_height": [0.04, 0.08], "com_displacement": 0.1, "controller": "torque",
+        "momentum_control": False, "solver": "osqp", "residual_scale": [0.05, 0.0, 0.01],
+        "residual_phases": "all", "control_frequency": None, "agent_frequency": 50.0,
+        "ankle_shift": True, "randomization": "full", "stand_time": 0.5, "render_mode": None,
+    }  # fmt: skip
+    file = tmp_path / "options.json"
+    file.write_text(json.dumps({"env": env, "seed": 4}))
+    found = read_options(file)
+    assert found == TrainOptions(env=TASK.replace(**env), seed=4)
+    assert found.env.residual == ResidualConfig((0.05, 0.0, 0.01), "all")
+    assert found.env.success.stand_time == 0.5
+    assert found.env.controller == TorqueConfig(momentum_control=False, solver="osqp")
+
+
+def test_shortcuts_end_up_in_the_jump():
+    found = TrainOptions(shortcuts=Shortcuts(solver="osqp", stand_time=0.5))
+    assert found == TrainOptions(env=TASK.replace(solver="osqp", stand_time=0.5))
+    assert found.env.controller_config.solver == "osqp"
+    assert found.env.randomization == TASK.randomization
+    assert "shortcuts" not in found.as_dict()
 
 
 CONTENTS = {
@@ -56,6 +84,7 @@ def test_another_file_is_refused(tmp_path, content):
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(ConfigError) as refusal:
         read_options(file)
+    assert str(file) in str(refusal.value)
     assert message in str(refusal.value).replace(f"{tmp_path}/", "")
 
 

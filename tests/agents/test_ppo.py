@@ -122,3 +122,22 @@ def test_a_jump_of_the_exported_policy_is_the_one_trained_on(rng):
         whole, *_ = plain.step(policy(whole))
         offsets.append(abs(whole[offset]))
     assert max(offsets) > 0.01
+
+
+def test_rewards_are_discounted_by_gamma_and_lambda():
+    """From the rewards of a rollout alone: the value function is set to zero."""
+    options, model = make(ppo=dataclasses.replace(PPO, gamma=0.5, gae_lambda=0.75))
+    buffer = model.rollout_buffer
+    buffer.rewards[:] = np.arange(buffer.buffer_size)[:, None]
+    buffer.values[:], buffer.episode_starts[:] = 0.0, 0.0
+    buffer.compute_returns_and_advantage(torch.zeros(1), np.array([True]))
+    share = options.ppo.gamma * options.ppo.gae_lambda
+    expected = 0.0
+    for step in reversed(range(buffer.buffer_size)):
+        expected = step + share * expected
+        assert buffer.returns[step, 0] == pytest.approx(expected)
+    # Of the value of the state after a step, gamma alone counts.
+    buffer.rewards[:], buffer.values[:] = 0.0, 1.0
+    buffer.compute_returns_and_advantage(torch.ones(1), np.array([False]))
+    assert buffer.advantages[-1, 0] == pytest.approx(options.ppo.gamma - 1.0)
+    assert model.gamma == options.ppo.gamma  # as for episodes that are cut off

@@ -66,3 +66,13 @@ def test_an_error_in_the_run_lifts_the_lock(tmp_path):
         _ = 1 / 0
     with lock_run(tmp_path / "new" / "run"):
         pass
+
+
+def test_the_lock_does_not_follow_a_link(tmp_path):
+    precious, run = tmp_path / "precious.txt", tmp_path / "run"
+    precious.write_text("do not touch")
+    run.mkdir()
+    (run / ".lock").symlink_to(precious)
+    with pytest.raises(OSError, match=r"\.lock"), lock_run(run):
+        pass
+    assert precious.read_text() == "do not touch"

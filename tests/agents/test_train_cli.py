@@ -22,6 +22,7 @@ from agents.options import TASK, PPOOptions, TrainOptions
 from agents.run_folder import lock_run
 from icub_jump_env.evaluation.cli import evaluate
 from icub_jump_env.evaluation.report.output import write_json
+from icub_jump_env.planning.residual import ResidualConfig
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -88,8 +89,11 @@ def test_flags_reach_the_options(asked):
     assert asked() == TrainOptions()
     assert asked("--controller", "torque", "--inputs", "command", "--axes", "forward", "lateral",
                  "--ppo.log-std", "-0.5", "-3", "--ppo.hidden", "32", "--seed", "7",
+                 "--stand-time", "0.5", "--residual.bandwidth", "20",
                  "--run", "here") == TrainOptions(
-        env=TASK.replace(controller="torque"),
+        env=TASK.replace(
+            controller="torque", stand_time=0.5, residual=ResidualConfig(bandwidth=20.0)
+        ),
         inputs="command",
         axes=("forward", "lateral"),
         ppo=PPOOptions(log_std=(-0.5, -3.0), hidden=(32,)),
@@ -102,7 +106,7 @@ def test_a_file_holds_where_the_command_line_says_nothing(asked, run):
     file = Path("run/options.json")
     config = dataclasses.replace(run, config=file)
     assert asked("--config", str(file)) == config
-    assert asked(f"--config={file}", "--seed", "6") == config.replace(seed=6)
+    assert asked(f"--config={file}", "--seed", "6") == dataclasses.replace(config, seed=6)
     # What fits together depends on the file: by default there are 64 episodes and 8 jobs.
     assert asked("--config", str(file), "--jobs", "2").jobs == 2
     assert asked("--config", str(file), "--ppo.episodes", "9").ppo.episodes == 9
@@ -134,7 +138,9 @@ def test_a_runs_options_are_those_of_another(asked):
         (["--resume", "run", "--config", "x"], ["config", "x", "not with --resume"]),
         (["--resume", "run", "--seed", "6"], ["seed=6", "5, as run/options.json has it"]),
         (["--resume", "run", "--ppo.epochs", "3"], ["ppo.epochs=3", "10, as run/options.json"]),
-        (["--resume", "run", "--stand-time", "1"], ["stand_time=1.0", "2.0, as run/options"]),
+        (["--resume", "run", "--stand-time", "1"], ["success.stand_time=1.0", "2.0, as run/options"]),
+        (["--resume", "run", "--residual.bandwidth", "20"], ["residual.bandwidth=20.0", "15.0"]),
+        (["--resume", "run", "--solver", "osqp"], ["controller={", "'osqp'", "'velocity', as run"]),
         (["--run", "run"], ["run='run'", "a folder without a run, or --resume run"]),
         (["--run", "run/options.json"], ["run/options.json", "exists"]),
         (["--config", "nowhere"], ["config", "nowhere", "No such file"]),
@@ -169,7 +175,7 @@ def test_a_damaged_record_of_the_options_is_refused(refused, run):
 
 def test_a_missing_package_is_named_with_its_remedy(refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "agents.training", None)
-    assert 'pip install "icub-jump[rl]"' in refused()
+    assert 'pip install -c constraints.txt -e ".[rl]"' in refused()
 
 
 class Bomb:

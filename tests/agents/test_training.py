@@ -2,7 +2,9 @@
 
 import errno
 import json
+import math
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -16,7 +18,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from tiny_run import ARGUMENTS, SEEDS, children, results, train, written
 
 from agents import training
-from agents.checkpoints import load_latest
+from agents.checkpoints import CheckpointError, load_latest
 from agents.environment import acting_steps
 from agents.options import read_options
 from agents.training import MOST_CHECKPOINTS
@@ -292,3 +294,22 @@ def test_the_longest_curve_fits_into_a_checkpoint():
     point["success_by_command"] = {f"{cm} to {cm + 1} cm": 1 / 3 for cm in range(10, 24)}
     progress = {"progress": {"updates": 10**9, "curve": [point] * (MOST_CHECKPOINTS + 1)}}
     assert len(strict_json(progress, indent=2)) < 0.9 * MAX_CARD_SIZE
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"updates": -1}, "updates=-1 is not allowed: a whole number from 0 updates"),
+        ({"updates": None}, "updates=None"),
+        ({"curve": {}}, "curve={} is not allowed: a list of 2 evaluations"),
+        ({"curve": [{"score": 1.0}]}, "a list of 2 evaluations"),
+        ({"curve": [{"score": 1.0}, {}]}, "score=None"),
+        ({"curve": [{"score": 1.0}, 3]}, "point of the curve=3"),
+        ({"curve": [{"score": 1.0}, {"score": math.nan}]}, "score=nan"),
+    ],
+)
+def test_a_checkpoint_without_a_trainings_progress_is_refused(change, message):
+    progress = {"updates": 4, "curve": [{"score": 1.0}, {"score": 2.0}]}
+    assert training._check_progress(2, progress) == (4, progress["curve"])
+    with pytest.raises(CheckpointError, match=f"^checkpoint 2: .*{re.escape(message)}"):
+        training._check_progress(2, progress | change)

@@ -5,8 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from icub_jump_env.control.qp.problem import QPSolution, QPStatus, QuadraticProgram, check_solution
-from icub_jump_env.control.qp.solvers import SOLVERS, make_solver
+from icub_jump_env.control.qp.check import check_solution
+from icub_jump_env.control.qp.problem import (
+    IDLE,
+    QPReport,
+    QPResiduals,
+    QPSolution,
+    QPStatus,
+    QPTolerances,
+    QuadraticProgram,
+    worse,
+)
+from icub_jump_env.control.qp.solvers import SOLVERS, CheckedSolver, make_solver
 
 seeds = st.integers(0, 10_000)
 
@@ -95,3 +105,68 @@ def test_infeasible_problems_are_not_solved(name):
     problem.C[-1] = problem.C[-2]
     problem.lower[-1] = problem.upper[-1] = problem.upper[-2] + 1.0
     assert make_solver(name, problem).solve().status is not QPStatus.SOLVED
+
+
+def poisoned(field, value):
+    problem = random_problem(3)
+    getattr(problem, field).flat[0] = value
+    return problem
+
+
+@pytest.mark.parametrize("built_before", [True, False])
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [*((field, np.nan) for field in ("H", "g", "C", "lower", "upper")),
+     ("H", np.inf), ("g", np.inf), ("C", -np.inf), ("H", -1e6), ("lower", 5.0)],
+)  # fmt: skip
+def test_a_problem_without_solution_prints_nothing(capfd, field, value, built_before):
+    """OSQP complains on stdout even if told to be silent."""
+    poison = poisoned(field, value)
+    problem = random_problem(3)
+    solver = make_solver("osqp", problem if built_before else poison)
+    if built_before:
+        for name in ("H", "g", "C", "lower", "upper"):
+            getattr(problem, name)[:] = getattr(poison, name)
+    assert solver.solve().status is not QPStatus.SOLVED
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("kind", QPResiduals._fields)
+def test_each_residual_alone_has_a_solution_refused(kind):
+    tolerances = QPTolerances(1e-8, 1e-8, 1e-6)
+    at_the_edge = QPResiduals(*tolerances)
+    assert tolerances.accept(at_the_edge)
+    for value in (1.01 * getattr(tolerances, kind), np.nan, np.inf):
+        assert not tolerances.accept(at_the_edge._replace(**{kind: value}))
+
+
+@pytest.mark.parametrize("name", sorted(SOLVERS))
+def test_a_feasible_stationary_point_that_is_not_optimal_is_rejected(name):
+    """Multipliers of bounds that are not active can make any point stationary: the gap tells."""
+    problem = random_problem(0)
+    problem.C[:] = 0.0
+    problem.lower[problem.n :], problem.upper[problem.n :] = -1.0, 1.0
+    problem.lower[-problem.n_equalities :] = problem.upper[-problem.n_equalities :] = 0.0
+    checked = CheckedSolver(name, problem)
+
+    class Lying:
+        tolerances = checked._solver.tolerances
+
+        def solve(self):
+            multipliers = np.concatenate((-problem.g, np.zeros(len(problem.C))))
+            return QPSolution(np.zeros(problem.n), multipliers, QPStatus.SOLVED, 1)
+
+    checked._solver = Lying()
+    _, report = checked.solve()
+    assert report.residuals.primal == 0.0
+    assert report.residuals.dual < 1e-12
+    assert report.residuals.gap > 1.0
+    assert report.status is QPStatus.REJECTED
+    assert report.failed
+
+
+def test_the_worse_of_two_reports_is_the_failed_one_then_the_less_exact():
+    exact, rough = (QPReport(QPStatus.SOLVED, QPResiduals(r, r, r), 1) for r in (1e-12, 1e-9))
+    failed = exact._replace(status=QPStatus.REJECTED)
+    for better, bad in ((exact, rough), (rough, failed), (IDLE, exact), (exact, failed)):
+        assert worse(better, bad) is worse(bad, better) is bad

@@ -8,18 +8,26 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from contenders import evaluate, save_constant
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import ContactConfig, TorqueConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation import cli
 from icub_jump_env.evaluation.figures import style
 from icub_jump_env.evaluation.modes import video
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.report.output import write_json
+from icub_jump_env.metrics.jump import SuccessConfig
+from icub_jump_env.planning.residual import ResidualConfig
+from icub_jump_env.shortcuts import Shortcuts
 
 REPOSITORY = Path(__file__).parents[2]
+
+ONE_EPISODE = ["--randomization", "full", "--stand-time", "0"]
+"""A short work for another process."""
 
 
 @pytest.fixture
@@ -34,7 +42,7 @@ def test_prints_the_table_and_writes_json_and_figures(capsys, tmp_path, coarse):
         capsys, "--stand-time", "0.3", "--json", str(report), "--plot", str(figures)
     )
     assert code == 0
-    for column in ("paper", "ours", "difference", "no eq. 3d"):
+    for column in ("paper", "ours", "10 to 90 %", "difference", "no eq. 3d"):
         assert column in out
     for row in ("flight height", "sole height", "take-off velocity", "take-off time",
                 "ballistic height", "rotation", "base pitch", "landed"):  # fmt: skip
@@ -42,13 +50,17 @@ def test_prints_the_table_and_writes_json_and_figures(capsys, tmp_path, coarse):
     assert "With the momentum constraint (3d) the robot stands; without it, it" in out
 
     content = json.loads(report.read_text(), parse_constant=pytest.fail)
-    assert content["config"]["stand_time"] == 0.3
+    assert content["config"]["success"]["stand_time"] == 0.3
     assert content["seed"] == 0
     assert {"mujoco", "pin", "daqp", "icub-models", "python"} <= set(content["versions"])
-    rises = {name: arm["jump"]["flight_height"] for name, arm in content["arms"].items()}
+    rises = {
+        name: 100 * np.array(arm["repeated"]["percentiles"]["flight_height"])
+        for name, arm in content["arms"].items()
+    }
     flight = next(r for r in content["comparison"] if r["quantity"].startswith("flight height"))
-    assert flight["ours"] == pytest.approx(100 * rises["with"])
-    assert flight["other"] == pytest.approx(100 * rises["without"])
+    assert [*flight["spread"], flight["ours"]] == pytest.approx(rises["with"][[0, 2, 1]])
+    assert flight["other"] == pytest.approx(rises["without"][1])
+    assert flight["spread"][0] < flight["ours"] < flight["spread"][1]
     assert flight["difference"] == pytest.approx(flight["ours"] - 3.5)
     pictures = sorted(figures.glob("*.png"))
     numbers = [p.name[:4] for p in pictures if p.name[:4] != "fig5"]  # which needs OpenGL
@@ -65,14 +77,16 @@ def test_figures_are_drawn_of_a_jump_that_does_not_take_off(capsys, tmp_path, co
 
 def test_without_the_constraint_ours_is_the_ablated_jump(capsys):
     _, out, _ = evaluate(capsys, "--stand-time", "0.2")
-    _, switched, _ = evaluate(capsys, "--stand-time", "0.2", "--no-momentum-control")
+    _, switched, _ = evaluate(capsys, "--stand-time", "0.2", "--momentum-control", "False")
     assert "no eq. 3d" in out
     assert "with eq. 3d" in switched
     row, other = (
         next(line.split() for line in text.splitlines() if "rotation" in line)
         for text in (out, switched)
     )
-    assert (row[-3], row[-1]) == (other[-1], other[-3])
+    assert row[:5] == other[:5] == ["rotation", "in", "flight,", "deg", "-"]
+    assert (row[5], row[-1]) == (other[-1], other[5])
+    assert row[5] != row[-1]
 
 
 def test_missing_egl_does_not_matter_without_pictures(tmp_path):
@@ -92,7 +106,7 @@ def test_missing_egl_does_not_matter_without_pictures(tmp_path):
         **{k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")},
         "PYTHONPATH": f"{tmp_path}:{REPOSITORY}",
     }
-    for arguments, code in ((["--stand-time", "0.1"], 0), (["--video", "jump.mp4"], 2)):
+    for arguments, code in ((ONE_EPISODE, 0), (["--video", "jump.mp4"], 2)):
         result = subprocess.run(
             [sys.executable, str(REPOSITORY / "eval.py"), *arguments],
             cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
@@ -107,15 +121,19 @@ def test_missing_egl_does_not_matter_without_pictures(tmp_path):
 def test_every_field_of_the_configuration_is_a_flag_of_the_same_name(capsys):
     _, out, _ = evaluate(capsys, "--help")
     assert ":class:" not in out
-    for field in dataclasses.fields(JumpConfig):
-        assert f"--{field.name.replace('_', '-')}" in out
+    for kind in (JumpConfig, Shortcuts):
+        for field in dataclasses.fields(kind):
+            assert f"--{field.name.replace('_', '-')}" in out
+    for flag in ("--residual.bandwidth", "--success.height-ratio", "--reward.landed"):
+        assert flag in out
 
 
 def test_flags_reach_the_configuration():
     options = cli.parse(
         EvalOptions,
-        ["--jump-height", "0.05", "0.06", "--no-momentum-control", "--residual_scale", "0.01", "0.02",
-         "0.03", "--com-displacement", "0.1", "--solver", "osqp"],
+        ["--jump-height", "0.05", "0.06", "--momentum-control", "False", "--residual_scale", "0.01",
+         "0.02", "0.03", "--com-displacement", "0.1", "--solver", "osqp", "--constraints", "hard",
+         "--residual.bandwidth", "20", "--success.height-ratio", "0.5"],
     )  # fmt: skip
     assert options.config == JumpConfig.of(
         jump_height=(0.05, 0.06),
@@ -123,6 +141,21 @@ def test_flags_reach_the_configuration():
         residual_scale=(0.01, 0.02, 0.03),
         com_displacement=0.1,
         solver="osqp",
+        constraints="hard",
+    ).replace(
+        residual=ResidualConfig((0.01, 0.02, 0.03), bandwidth=20.0),
+        success=SuccessConfig(height_ratio=0.5),
+    )
+
+
+def test_models_are_given_by_name_or_json():
+    gains = '{"kind": "torque", "com_stiffness": 150, "contact": {"friction": 0.4}}'
+    words = ["--controller", gains, "--solver", "osqp", "--sensors", "realistic"]
+    assert cli.parse(EvalOptions, words).config == JumpConfig(
+        controller=TorqueConfig(
+            com_stiffness=150.0, contact=ContactConfig(friction=0.4), solver="osqp"
+        ),
+        sensors="realistic",
     )
 
 
@@ -263,6 +296,46 @@ def test_refusals_are_one_plain_line_in_a_terminal():
     assert result.stderr == "error: Unrecognized options: --wings, 2\n"
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["--jump-hight", "0.05"], "--jump-hight, 0.05; did you mean --jump-height?"),
+        (["--sweepp"], "--sweepp; did you mean --sweep?"),
+        (["--sede", "1", "--solvr", "osqp"], "osqp; did you mean --seed or --solver?"),
+        (["--wings", "2"], "--wings, 2"),
+    ],
+)
+def test_a_misspelt_flag_is_told_the_nearest(capsys, words, meant):
+    code, out, err = evaluate(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: Unrecognized options: ")
+    assert err.endswith(f"{meant}\n")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--actuators", "[" * 100_000),
+        ("--sensors", "[" * 900 + "]" * 900),
+        ("--sensors", '{"tilt": ' + "[" * 900 + "]" * 900 + "}"),
+        ("--actuators", '{"motor": ' * 200 + "1" + "}" * 200),
+        ("--sensors", '{"delay": 1' + "0" * 100_000 + "}"),
+        ("--actuators", "\x1b[31m\x07"),
+        ("--actuators", json.dumps({"\x1b[31m\n": "\x1b"})),
+        ("--jump-height", "\x1b[31m\n"),
+        ("--\x1b[31m",),
+    ],
+    ids=range(9),
+)
+def test_whatever_is_given_the_refusal_is_one_printable_line(capsys, words):
+    code, out, err = evaluate(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.removesuffix("\n").isprintable()
+    assert len(err) <= 2100
+
+
 def test_paths_are_not_taken_for_markup(capsys, tmp_path):
     report = tmp_path / "[red]r[" / "q[b].json"
     report.parent.mkdir()
@@ -271,13 +344,20 @@ def test_paths_are_not_taken_for_markup(capsys, tmp_path):
     assert f"wrote {report}\n" in err
 
 
+def test_what_is_said_is_one_line_without_orders_for_the_terminal(capsys, tmp_path):
+    report = tmp_path / "a\x1b[31m\nb.json"
+    code, out, err = evaluate(capsys, "--stand-time", "0.1", "--json", str(report))
+    assert (code, err) == (0, "")
+    assert rf"wrote {tmp_path}/a\x1b[31m\nb.json" in out.splitlines()
+
+
 def test_json_is_written_though_nobody_reads_the_table(tmp_path):
-    command = [sys.executable, str(REPOSITORY / "eval.py"), "--stand-time", "0.1", "--json", "j"]
+    command = [sys.executable, str(REPOSITORY / "eval.py"), *ONE_EPISODE, "--json", "j"]
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     ) as process:
         process.stdout.close()
-    assert json.loads((tmp_path / "j").read_text())["mode"] == "nominal"
+    assert json.loads((tmp_path / "j").read_text())["mode"] == "statistics"
 
 
 def test_eval_py_runs_from_anywhere(tmp_path):

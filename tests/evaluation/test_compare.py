@@ -2,11 +2,13 @@
 
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from contenders import FEEDBACK, episode, evaluate, save, save_constant
+from matplotlib import rc_context
 from matplotlib.colors import to_rgba
 from rich.console import Console
 
@@ -15,10 +17,9 @@ from icub_jump_env.evaluation.episodes import series
 from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.figures.compare import compare_figure
-from icub_jump_env.evaluation.modes.compare import (
-    render,
-)
+from icub_jump_env.evaluation.modes.compare import render
 from icub_jump_env.evaluation.statistics.summary import Rate
+from icub_jump_env.metrics.jump import SuccessConfig
 
 
 def two_ranges(pattern, rise):
@@ -76,7 +77,7 @@ class TestTable:
 
 class TestFigure:
     def test_bars_are_the_success_rates_with_their_intervals(self):
-        left, _ = compare_figure(ARMS).axes
+        left, _ = compare_figure(ARMS, SuccessConfig(height_ratio=0.6)).axes
         assert [label.get_text() for label in left.get_xticklabels()] == ["4 to 5", "6 to 7"]
         assert (left.get_xlabel(), left.get_ylabel()) == ("command (cm)", "success (%)")
         shown = [text.get_text() for text in left.get_legend().get_texts()]
@@ -93,7 +94,7 @@ class TestFigure:
         assert first.get_facecolor() != second.get_facecolor()
 
     def test_points_are_the_episodes(self):
-        left, right = compare_figure(ARMS).axes
+        left, right = compare_figure(ARMS, SuccessConfig(height_ratio=0.6)).axes
         assert (right.get_xlabel(), right.get_ylabel()) == ("command (cm)", "CoM rise (cm)")
         *points, command, least = right.lines
         bars = [c for c in left.containers if hasattr(c, "patches")]
@@ -106,9 +107,20 @@ class TestFigure:
                 assert to_rgba(line.get_color()) == bar.patches[0].get_facecolor()
             assert landed.get_marker() != fallen.get_marker()
         assert list(command.get_ydata()) == pytest.approx([4.0, 6.0])
-        assert list(least.get_ydata()) == pytest.approx([2.8, 4.2])
+        assert list(least.get_ydata()) == pytest.approx([2.4, 3.6])
         shown = [text.get_text() for text in right.get_legend().get_texts()]
         assert shown == ["first, fallen", "second, fallen", "command", "least for a success"]
+
+    def test_names_are_shown_as_they_are(self, tmp_path):
+        names = ["cost$1$", r"\$2", "_hidden", "a_b^c"]
+        figure = compare_figure(dict.fromkeys(names, ARMS["first"]))
+        left, right = (axes.get_legend().get_texts() for axes in figure.axes)
+        assert [text.get_text() for text in left] == names
+        assert [text.get_text() for text in right][:4] == [f"{name}, fallen" for name in names]
+        with rc_context({"svg.fonttype": "none"}):
+            figure.savefig(tmp_path / "figure.svg")
+        drawn = re.findall("<text [^>]*>(.*?)</text>", (tmp_path / "figure.svg").read_text())
+        assert set(names) <= set(drawn)
 
 
 RANDOM = {"randomization": "full", "jump_height": (0.03, 0.06), "stand_time": 0.0}

@@ -21,6 +21,7 @@ from icub_jump_env.evaluation.episodes.series import Series
 from icub_jump_env.evaluation.figures import policy as policy_figures
 from icub_jump_env.evaluation.modes import video, view
 from icub_jump_env.policy import load_policy
+from icub_jump_env.policy.saving import SHIPPED
 
 QUIET = Console(file=io.StringIO())
 SHORT = ("--stand-time", "0.1")
@@ -48,7 +49,7 @@ class TestSingleJump:
         file = save_constant(tmp_path / "zero.safetensors", 0, 0, 0)
         code, out, _ = evaluate(capsys, "--policy", file, *SHORT, "--json", "r.json")
         assert code == 0
-        assert "paper ours difference baseline" in " ".join(out.split())
+        assert "paper ours 10 to 90 % difference baseline" in " ".join(out.split())
         arms = json.loads((tmp_path / "r.json").read_text())["arms"]
         assert arms["policy"]["jump"] == arms["baseline"]["jump"] == jump_of(None)
 
@@ -65,12 +66,13 @@ class TestSingleJump:
         assert arms["baseline"]["policy"] == {"name": "baseline", "sha256": None}
         lean = next(r for r in content["comparison"] if r["quantity"] == "rotation in flight")
         ours, theirs = (
-            np.degrees(arms[name]["jump"]["flight_rotation"]) for name in ("policy", "baseline")
+            np.degrees(arms[name]["repeated"]["percentiles"]["flight_rotation"][1])
+            for name in ("policy", "baseline")
         )
         assert (lean["ours"], lean["other"]) == pytest.approx((ours, theirs))
         row = next(line.split() for line in out.splitlines() if "rotation in flight" in line)
-        assert (row[-3], row[-1]) == (f"{ours:.1f}", f"{theirs:.1f}")
-        assert row[-3] != row[-1]
+        assert (row[5], row[-1]) == (f"{ours:.1f}", f"{theirs:.1f}")
+        assert row[5] != row[-1]
 
     def test_the_picture_shows_where_the_reference_was_moved(self, capsys, tmp_path, monkeypatch):
         drawn, figure = [], policy_figures.policy_figure
@@ -160,7 +162,7 @@ class TestAsTrained:
             (["--no-ankle-shift"], ["ankle_shift=False instead of True"]),
             (["--agent-frequency", "100"], ["agent_frequency=100.0 instead of 50.0"]),
             (
-                ["--no-momentum-control", "--controller", "torque"],
+                ["--momentum-control", "False", "--controller", "torque"],
                 ["momentum_control=False instead of True", "controller='torque' instead of",
                  "control_frequency=500.0 instead of 200.0"],
             ),
@@ -193,6 +195,7 @@ class TestOtherModes:
         assert json.loads((tmp_path / "r.json").read_text())["policy"] == identity
         log = tmp_path / "log.jsonl"
         header = json.loads(log.read_text().splitlines()[0])
+        del header["crc32"]
         assert header["policy"] == identity
         env = make_env(JumpConfig.of(randomization="full", stand_time=0.1))
         episodes = EpisodeLog(log, header, resume=True).episodes
@@ -281,6 +284,7 @@ class TestOtherModes:
         assert isinstance(config.jump_height, float)
         log = tmp_path / "log.jsonl"
         header = json.loads(log.read_text().splitlines()[0])
+        del header["crc32"]
         recorded = EpisodeLog(log, header, resume=True).episodes[seed]
         assert not recorded.is_success
         assert run_episode(make_env(config), seed, policy) == recorded
@@ -331,6 +335,53 @@ class TestNames:
             words.append(str(save_constant(file, 0, 0, 0)))
         names = [contender.name for contender in read_contenders(words)]
         assert names == ["baseline", "first-best", "second-best", "last"]
+
+    def test_nothing_in_a_name_reaches_the_terminal(self, capsys, tmp_path):
+        file = save_constant(tmp_path / "red\x1b[31m\n[bold]\x07.safetensors", 0.1, 0, 0)
+        code, out, err = evaluate(capsys, "--policy", file, *SHORT)
+        assert (code, err) == (0, "")
+        assert r"with red\x1b[31m\n[bold]\x07, after" in out
+        assert out.replace("\n", "").isprintable()
+        file.with_suffix(".json").write_text("[]")
+        message = refusal(capsys, "--policy", file)
+        assert r"red\x1b[31m [bold]\x07.json: not a JSON object" in message
+
+    def test_nothing_in_a_card_reaches_the_terminal(self, capsys, tmp_path):
+        file = save_constant(tmp_path / "mine.safetensors", 0.1, 0, 0)
+        card = json.loads(file.with_suffix(".json").read_text())
+        for field, value in (("kind", "\x1b[2J\n"), ("\x1b[2J\n", 3), ("axes", ["\x1b[2J\n"])):
+            file.with_suffix(".json").write_text(json.dumps(card | {field: value}))
+            message = refusal(capsys, "--policy", file)
+            assert message.removesuffix("\n").isprintable()
+            assert "x1b[2J" in message
+
+    def test_shipped_policies_and_the_baseline_have_names(self):
+        found = read_contenders(["torque", "baseline", "torque-constant"])
+        assert [contender.name for contender in found] == ["torque", "baseline", "torque-constant"]
+        assert [contender.is_baseline for contender in found] == [False, True, False]
+        (by_path,) = read_contenders([str(SHIPPED / "torque.safetensors")])
+        assert found[0].identity == by_path.identity
+
+    @pytest.mark.parametrize(
+        ("words", "mode", "height"),
+        [
+            (["--policy", "torque"], "nominal", 0.04),
+            (["--compare", "baseline", "torque", "torque-open-loop"], "compare", (0.04, 0.08)),
+        ],
+    )
+    def test_the_command_line_takes_the_names(self, capsys, monkeypatch, words, mode, height):
+        asked = []
+        monkeypatch.setattr(
+            f"icub_jump_env.evaluation.modes.{mode}.run",
+            lambda options, contenders, *_: asked.append((options, contenders)),
+        )
+        assert evaluate(capsys, *words)[0] == 0
+        ((options, contenders),) = asked
+        assert [contender.name for contender in contenders] == words[1:]
+        config = load_policy("torque").card.config
+        assert options.config.controller == config.controller
+        assert options.config.com_displacement == config.com_displacement
+        assert options.config.jump_height == height
 
     def test_the_same_policy_by_two_paths_is_refused(self, tmp_path):
         file = save_constant(tmp_path / "mine.safetensors", 0, 0, 0)

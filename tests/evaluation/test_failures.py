@@ -5,6 +5,7 @@ import math
 import pytest
 
 from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
+from icub_jump_env.metrics.jump import SuccessConfig
 
 GOOD = {
     "flight_time": 0.18, "landed": True, "flight_height": 0.04, "flight_rotation": 0.01,
@@ -35,4 +36,16 @@ FELL = {"landed": False}
     ],
 )
 def test_classes(outcome, changes, failure):
-    assert failure_of(outcome, GOOD | changes, 0.04) is failure
+    assert failure_of(outcome, GOOD | changes, 0.04, SuccessConfig()) is failure
+
+
+@pytest.mark.parametrize(
+    ("success", "failure"),
+    [
+        (SuccessConfig(), None),
+        (SuccessConfig(height_ratio=1.01), Failure.TOO_LOW),
+        (SuccessConfig(flight_time=0.19), Failure.NO_TAKEOFF),
+    ],
+)
+def test_what_counts_as_a_success_is_configured(success, failure):
+    assert failure_of("stood", GOOD, 0.04, success) is failure

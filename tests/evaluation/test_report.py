@@ -49,12 +49,31 @@ def pictures():
 
 
 @pytest.fixture(scope="session")
-def page(pictures, tmp_path_factory):
+def written(pictures, tmp_path_factory):
     folder = tmp_path_factory.mktemp("reports") / "made" / "here"
-    file = report.write_report(folder, CONFIG, 0, QUIET)
+    run, shown = report.run_nominal, {}
+
+    def remembered(config, *rest, **how):
+        shown[config.controller_name] = run(config, *rest, **how)
+        return shown[config.controller_name]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "run_nominal", remembered)
+        file = report.write_report(folder, CONFIG, 0, QUIET)
     assert list(folder.iterdir()) == [file]
     assert file.name == "index.html"
-    return file
+    return file, shown
+
+
+@pytest.fixture(scope="session")
+def page(written):
+    return written[0]
+
+
+@pytest.fixture(scope="session")
+def arms(written):
+    """What was jumped for the page, by controller."""
+    return written[1]
 
 
 @pytest.fixture(scope="session")
@@ -148,22 +167,26 @@ def test_page_is_accessible(read):
 
 
 @pytest.mark.parametrize("controller", ["velocity", "torque"])
-def test_table_says_what_the_jump_did(read, controller):
-    config = JumpConfig.of(controller=controller, stand_time=0.1)
-    arms = [
-        jump(controller=controller, stand_time=0.1, momentum_control=posed)
-        for posed in (True, False)
-    ]
+def test_table_says_what_the_jump_did(read, arms, controller):
+    ours, ablated = arms[controller]
+    for arm, posed in ((ours, True), (ablated, False)):
+        expected = jump(controller=controller, stand_time=0.1, momentum_control=posed)
+        assert arm.episode.jump == expected.jump
     head, *lines = read.tables[controller]
     assert [word.replace("\N{SOFT HYPHEN}", "") for word in head] == [
-        "quantity", "paper", "ours", "difference", "no eq. 3d",
+        "quantity", "paper", "ours", "10 to 90 %", "difference",
+        f"no eq. {'3d' if controller == 'velocity' else '6d'}",
     ]  # fmt: skip
-    rows = comparison_rows(config, *arms)
+    rows = comparison_rows(ours.config, ours.repeated, ablated.repeated)
     assert len(lines) == len(rows)
     for row, (quantity, *cells) in zip(rows, lines, strict=True):
         assert quantity.startswith(f"{row.quantity}, {row.unit}")
+        paper, middle, spread, difference, other = cells
+        low, _, high = spread.partition(" to ")
         for value, cell in zip(
-            (row.paper, row.ours, row.difference, row.other), cells, strict=True
+            (row.paper, row.ours, *row.spread, row.difference, row.other),
+            (paper, middle, low, high or low, difference, other),
+            strict=True,
         ):
             if value is None:
                 assert cell == "\N{EN DASH}"
@@ -178,7 +201,8 @@ def test_page_has_the_whole_configuration_and_the_versions(page, read):
     assert list(fields) == [field.name for field in dataclasses.fields(JumpConfig)]
     assert fields["controller"] == "velocity and torque"
     assert fields["jump_height"] == "0.04"
-    assert fields["stand_time"] == "0.1 not the default"
+    assert fields["success"] == f"{CONFIG.success} not the default"
+    assert "stand_time=0.1" in fields["success"]
     assert {"icub-jump", "mujoco", "python"} <= set(versions)
 
 
@@ -247,8 +271,8 @@ def test_other_jumps_are_told_from_the_papers(unseen, monkeypatch, tmp_path):
     assert "&lt;script&gt;" in text
     for controller in ("velocity", "torque"):
         head, flight, *_ = read.tables[controller]
-        assert head[-1] == "with eq. 3d"
-        assert flight[3] == "\N{EN DASH}"
+        assert head[-1] == f"with eq. {'3d' if controller == 'velocity' else '6d'}"
+        assert flight[4] == "\N{EN DASH}"
     assert "the paper’s simulation" not in text  # noqa: RUF001 (typographic)
     assert "Velocity controller with the constraint" in text
     assert "and it falls" in text

@@ -11,7 +11,9 @@ from rich.console import Console
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.episodes.series import perturbed
 from icub_jump_env.evaluation.modes.nominal import run_nominal
+from icub_jump_env.simulation.randomization import Randomization
 
 RANDOM = {"randomization": "full", "sensors": "realistic", "stand_time": 0.1}
 
@@ -86,3 +88,25 @@ def test_the_single_jump_is_the_same_with_and_without_figures():
         assert untraced(ours.episode) == untraced(theirs.episode)
         assert theirs.episode.trace
     assert plain[0].episode.jump != plain[1].episode.jump
+
+
+def test_each_arm_is_repeated_with_slightly_other_masses(monkeypatch, quiet):
+    monkeypatch.setattr("icub_jump_env.evaluation.modes.nominal.REPETITIONS", 3)
+    config = JumpConfig.of(stand_time=0.1)
+    arms = run_nominal(config, 4, False, quiet)
+    for arm, posed in zip(arms, (True, False), strict=True):
+        assert arm.config == config.replace(momentum_control=posed)
+        env = make_env(perturbed(arm.config))
+        assert list(arm.repeated) == [run_episode(env, seed) for seed in (4, 5, 6)]
+        assert len({episode.jump["flight_height"] for episode in arm.repeated}) == 3
+        assert set(arm.episode.world["link_mass"]) == {1.0}
+
+
+def test_a_perturbed_jump_is_the_same_but_for_masses_within_a_thousandth():
+    config = JumpConfig.of(controller="torque", actuators="realistic", jump_height=0.05)
+    assert perturbed(config) == config.replace(
+        randomization=Randomization(link_mass=(0.999, 1.001))
+    )
+    scales = make_env(perturbed(config)).reset(seed=3)[1]["world"]["link_mass"]
+    assert len(set(scales)) > 10
+    assert 0.999 <= min(scales) < 1.0 < max(scales) <= 1.001

@@ -10,6 +10,8 @@ import subprocess
 import sys
 import threading
 import types
+import urllib.error
+import urllib.parse
 import urllib.request
 import warnings
 
@@ -84,9 +86,20 @@ def listeners():
     return {(c.laddr.ip, c.laddr.port) for c in connections if c.status == psutil.CONN_LISTEN}
 
 
-def get(address):
-    with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
-        return answer.status, answer.read()
+def get(address, *files, headers=()):
+    """Status and content of a page, or of files that it asks for with its cookie."""
+    cookies = urllib.request.HTTPCookieProcessor()
+    opener = urllib.request.build_opener(cookies)
+    answers = []
+    for url in (address, *(urllib.parse.urljoin(address, file) for file in files)):
+        request = urllib.request.Request(url, headers=dict(headers))
+        try:
+            with opener.open(request, timeout=PATIENCE) as answer:
+                answers.append((answer.status, answer.read()))
+        except urllib.error.HTTPError as refusal:
+            with refusal:
+                answers.append((refusal.status, refusal.read()))
+    return answers if files else answers[0]
 
 
 serves = pytest.mark.filterwarnings("ignore::ResourceWarning")
@@ -104,18 +117,18 @@ def test_the_page_is_served_to_this_machine_alone(model, browser_screen, capsys)
     before = listeners()
     with contextlib.closing(browser_screen(model)) as screen:
         opened = listeners() - before
-        port = int(screen.address.removeprefix("http://127.0.0.1:").removesuffix("/"))
-        assert ("127.0.0.1", port) in opened
+        url = urllib.parse.urlsplit(screen.address)
+        assert (url.scheme, url.hostname, url.path) == ("http", "127.0.0.1", "/")
+        assert ("127.0.0.1", url.port) in opened
         assert {ip for ip, _ in opened} == {"127.0.0.1"}
-        status, page = get(screen.address)
-        assert status == 200
-        assert b"<canvas" in page
-        for file in ("web_client.js", "web_client.wasm"):
-            status, content = get(screen.address + file)
+        files = ("web_client.js", "web_client.wasm", "model?total_bytes")
+        page, *programs, size = get(screen.address, *files)
+        assert page[0] == 200
+        assert b"<canvas" in page[1]
+        for status, content in programs:
             assert status == 200
             assert len(content) > 100_000
-        size = json.loads(get(screen.address + "model?total_bytes")[1])["total_bytes"]
-        assert size > 10_000
+        assert json.loads(size[1])["total_bytes"] > 10_000
         assert screen.refresh({"time": "0.000 s"}) == []
     assert listeners() == before
     assert capsys.readouterr().out == ""
@@ -138,6 +151,78 @@ def test_it_does_not_start_where_others_could_connect(model, browser_screen, mon
     before = listeners()
     monkeypatch.setattr(LoopbackViewer, "_host", None)
     with pytest.raises(OSError, match=r"would listen on (::|0\.0\.0\.0) "):
+        browser_screen(model)
+    assert listeners() == before
+
+
+@serves
+def test_the_page_is_shown_to_those_who_have_its_address(model, browser_screen):
+    with contextlib.closing(browser_screen(model)) as screen:
+        url = urllib.parse.urlsplit(screen.address)
+        page = f"http://{url.netloc}/"
+        token = urllib.parse.parse_qs(url.query)["token"][0]
+        assert len(token) >= 32
+        for refused in (page, f"{page}?token=", f"{page}?token={token[:-1]}", f"{page}?token=ä"):
+            assert get(urllib.parse.quote(refused, "/:?="))[0] == 403
+        for file in ("web_client.js", "model", "favicon.ico", "assets/ibl.ktx"):
+            assert get(page + file)[0] == 403
+        cookies = {"Cookie": f"icub_jump_{url.port}={token}"}
+        assert get(page, headers=cookies)[0] == 200
+        assert get(page, headers={"Cookie": f'strange="; a=b; {cookies["Cookie"]}'})[0] == 200
+        for wrong in (f"icub_jump_{url.port}={token}x", f"icub_jump_{url.port}", f"a={token}"):
+            assert get(page, headers={"Cookie": wrong})[0] == 403
+        for headers, status in (
+            ({"Host": f"localhost:{url.port}"}, 200),
+            ({"Host": "rebound.example"}, 403),
+            ({"Host": f"rebound.example:{url.port}"}, 403),
+            ({"Host": "127.0.0.1"}, 403),
+            ({"Origin": f"http://{url.netloc}"}, 200),
+            ({"Origin": "http://evil.example"}, 403),
+            ({"Origin": f"http://127.0.0.1:{url.port + 1}"}, 403),
+            ({"Origin": "null"}, 403),
+        ):
+            assert get(screen.address, headers=headers)[0] == status
+    with contextlib.closing(browser_screen(model)) as another:
+        assert token not in another.address
+
+
+@serves
+def test_streams_are_for_the_page_alone_and_uploads_for_nobody(model, browser_screen):
+    client = pytest.importorskip("websockets.sync.client")
+    refusal = pytest.importorskip("websockets.exceptions").InvalidStatus
+    with contextlib.closing(browser_screen(model)) as screen:
+        url = urllib.parse.urlsplit(screen.address)
+        stream = f"ws://{url.netloc}"
+        cookie = {"Cookie": f"icub_jump_{url.port}={url.query.removeprefix('token=')}"}
+
+        def connect(path, headers, origin=None):
+            return client.connect(
+                stream + path, additional_headers=headers, origin=origin,
+                proxy=None, open_timeout=PATIENCE,
+            )  # fmt: skip
+
+        screen.refresh({})
+        with connect("/state?sid=a", cookie, f"http://{url.netloc}") as state:
+            messages = [state.recv(PATIENCE) for _ in range(3)]
+            assert any(str(message).startswith("viewers=1;") for message in messages)
+        for path in ("/state", "/ui", "/drop"):
+            for headers, origin in (({}, None), (cookie, "http://evil.example")):
+                with pytest.raises(refusal) as error:
+                    connect(path, headers, origin)
+                assert error.value.response.status_code == 403
+        with pytest.raises(refusal) as error:
+            connect("/drop?sid=a", cookie, f"http://{url.netloc}")
+        assert error.value.response.status_code == 403
+
+
+@serves
+def test_it_does_not_serve_without_its_gate(model, browser_screen, monkeypatch):
+    """As if a future Studio served in another way."""
+    from icub_jump_env.simulation.viewers import browser
+
+    before = listeners()
+    monkeypatch.setattr(browser.web_server, "serve", browser._serve)
+    with pytest.raises(OSError, match="show the jump to anybody"):
         browser_screen(model)
     assert listeners() == before
 

@@ -15,7 +15,7 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.contender import BASELINE
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.statistics import intervals
-from icub_jump_env.metrics.jump import JumpMetrics
+from icub_jump_env.metrics.jump import JumpMetrics, SuccessConfig
 from icub_jump_env.policy import save_policy
 
 
@@ -120,4 +120,4 @@ def test_all_are_judged_by_the_policys_command(command, rise, landed, time, succ
     found = judged(episode)
     assert found == dataclasses.replace(episode, jump_height=0.06, is_success=success)
     jumped = JumpMetrics(flight_height=rise, landed=landed, flight_time=time)
-    assert success == jumped.is_success(0.06)
+    assert success == jumped.is_success(0.06, SuccessConfig())

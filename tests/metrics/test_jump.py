@@ -6,10 +6,17 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from icub_jump_env.metrics.jump import JointLimits, JumpMetrics, JumpRecorder
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.metrics.jump import (
+    CHATTER_TIME,
+    JointLimits,
+    JumpMetrics,
+    JumpRecorder,
+    SuccessConfig,
+)
 from icub_jump_env.metrics.state import TrueState
 from icub_jump_env.robot.icub import GRAVITY
 
@@ -66,6 +73,7 @@ def recorded(speed=0.886, stand_time=0.3, **values):
     return recorder
 
 
+@settings(max_examples=10)
 @given(st.floats(0.2, 2.0))
 def test_parabola(speed):
     metrics = recorded(speed).metrics
@@ -109,7 +117,7 @@ def test_nothing_is_defined_without_a_flight():
     ):
         assert math.isnan(getattr(metrics, name))
     assert not metrics.landed
-    assert not metrics.is_success(0.04)
+    assert not metrics.is_success(0.04, SuccessConfig())
 
 
 def test_chatter_before_take_off_does_not_count():
@@ -232,18 +240,30 @@ def test_joint_work_counts_driving_and_braking():
 
 
 @pytest.mark.parametrize(
-    ("changes", "success"),
+    ("changes", "thresholds", "success"),
     [
-        ({}, True),
-        ({"landed": False}, False),
-        ({"flight_time": 0.099}, False),
-        ({"flight_height": 0.0279}, False),
-        ({"flight_height": 0.0281}, True),
+        ({}, {}, True),
+        ({"landed": False}, {}, False),
+        ({"flight_time": 0.099}, {}, False),
+        ({"flight_height": 0.0279}, {}, False),
+        ({"flight_height": 0.0281}, {}, True),
+        ({"flight_time": 0.099}, {"flight_time": 0.05}, True),
+        ({}, {"flight_time": 0.2}, False),
+        ({"flight_height": 0.0279}, {"height_ratio": 0.5}, True),
+        ({}, {"height_ratio": 1.1}, False),
     ],
 )
-def test_success(changes, success):
+def test_success(changes, thresholds, success):
     values = {"landed": True, "flight_time": 0.19, "flight_height": 0.04} | changes
-    assert JumpMetrics(**values).is_success(0.04) is success
+    assert JumpMetrics(**values).is_success(0.04, SuccessConfig(**thresholds)) is success
+
+
+@pytest.mark.parametrize("field", ["flight_time", "height_ratio", "stand_time"])
+@pytest.mark.parametrize("value", [-0.1, math.nan, 100.0, "long", True])
+def test_bad_thresholds_are_refused(field, value):
+    with pytest.raises(ConfigError) as refusal:
+        SuccessConfig(**{field: value})
+    assert refusal.value.field == field
 
 
 def test_metrics_are_plain_floats_and_bools():
@@ -262,6 +282,55 @@ def test_undefined_is_a_nan_that_equals_itself():
     assert pickle.loads(pickle.dumps(undefined)) == undefined
     assert undefined != 0.0
     assert json.dumps(undefined) == "NaN"
+
+
+class TestFlights:
+    def three_jumps(self):
+        """Jumps of 0.5, 0.9 and 0.7 m/s with loss of contact for 10 ms in between."""
+        recorder, time, starts = JumpRecorder(LIMITS, 0.3), 0.0, []
+        for speed in (0.5, 0.9, 0.7):
+            time = stand(recorder, time, 0.2)
+            starts.append(time)
+            time = ballistic(recorder, time, speed)
+            time = stand(recorder, time, 0.05)
+            for i in range(10):
+                recorder.update(state(time + i * DT, force=0.0))
+            time += 10 * DT
+        stand(recorder, time, 0.4)
+        return recorder, starts
+
+    def test_all_are_kept_in_time_but_chatter(self):
+        recorder, starts = self.three_jumps()
+        flights = recorder.flights
+        assert [flight.time for flight in flights] == pytest.approx(starts)
+        for flight, speed in zip(flights, (0.5, 0.9, 0.7), strict=True):
+            height = speed**2 / (2 * GRAVITY)
+            assert flight.velocity == pytest.approx(speed)
+            assert flight.apex - flight.height == pytest.approx(height, abs=GRAVITY * DT**2)
+            assert flight.duration == pytest.approx(2 * speed / GRAVITY, abs=2 * DT)
+
+    def test_the_metrics_are_those_of_the_highest(self):
+        recorder, starts = self.three_jumps()
+        metrics, highest = recorder.metrics, recorder.flights[1]
+        assert metrics.takeoff_time == highest.time == pytest.approx(starts[1])
+        assert metrics.flight_time == highest.duration
+        assert metrics.flight_height == highest.apex - highest.height
+        assert metrics.takeoff_velocity == highest.velocity
+        touch_down = highest.time + highest.duration
+        assert recorder.touchdown_time == pytest.approx(touch_down)
+        assert metrics.landed
+
+    @pytest.mark.parametrize(("steps", "flights"), [(20, 0), (21, 1)])
+    def test_a_flight_lasts_20_ms(self, steps, flights):
+        recorder = JumpRecorder(LIMITS, 0.3)
+        for i in range(steps):
+            recorder.update(state(i * CHATTER_TIME / 20, force=0.0))
+        assert len(recorder.flights) == flights
+
+    def test_reset_forgets_them(self):
+        recorder, _ = self.three_jumps()
+        recorder.reset()
+        assert recorder.flights == []
 
 
 def test_a_higher_second_flight_starts_the_standing_anew():

@@ -17,6 +17,7 @@ from icub_jump_env.errors import ConfigError, PolicyMismatchError
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import PolicyCard, check_match
 from icub_jump_env.policy.card import TASK_FIELDS, mismatches
+from icub_jump_env.shortcuts import Shortcuts, path_to
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 from icub_jump_env.simulation.actuators.servo import ServoGains
@@ -77,7 +78,7 @@ def test_the_content_is_plain():
     assert content["format"] == 1
     assert content["inputs"] == ["gyro.y", "phase.launch", "time"]
     assert content["observation"][2] == ["phase.landing", 1.0]
-    assert content["config"]["residual_scale"] == [0.06, 0.02, 0.02]
+    assert content["config"]["residual"]["scale"] == [0.06, 0.02, 0.02]
     assert content["results"] == {
         "success": {"full": 0.83, "interval": [0.77, 0.88]},
         "rise": None,
@@ -172,6 +173,7 @@ def test_any_json_is_taken_or_refused_cleanly(name, value):
 
 
 OTHERS = {
+    "robot": "iCubGazeboV2_5",
     "residual_phases": "all",
     "controller": "torque",
     "com_displacement": 0.1,
@@ -189,7 +191,7 @@ def test_each_field_of_the_task_must_match(field):
     card = make_card()
     other = JumpConfig.of(**{field: OTHERS[field]})
     found = mismatches(card, other)
-    trained = 200.0 if field == "control_frequency" else getattr(JumpConfig(), field)
+    trained = JumpConfig().value_of(field)
     assert (field, trained, OTHERS[field]) in found
     # The default rate depends on the controller.
     assert {name for name, _, _ in found} <= {field, "control_frequency"}
@@ -231,10 +233,12 @@ def test_the_rest_of_the_configuration_may_differ():
 def test_the_fields_are_sorted_into_two_kinds_with_none_forgotten():
     """A new field of the configuration must be sorted, too."""
     free = {
-        "jump_height", "solver", "timestep", "actuators", "sensors", "command_delay",
-        "randomization", "stand_time", "render_mode",
+        "jump_height", "solver", "constraints", "launch_end", "timestep", "actuators", "sensors",
+        "command_delay", "randomization", "reward", "success", "stand_time", "rendering",
+        "render_mode", "width", "height", "camera", "residual",
     }  # fmt: skip
-    assert {f.name for f in dataclasses.fields(JumpConfig)} == free | set(TASK_FIELDS)
+    names = {f.name for kind in (JumpConfig, Shortcuts) for f in dataclasses.fields(kind)}
+    assert names == free | set(TASK_FIELDS)
 
 
 def test_the_layout_must_match_by_name():
@@ -250,12 +254,48 @@ def test_the_layout_must_match_by_name():
     ]
 
 
-@pytest.mark.parametrize("field", TASK_FIELDS)
+@pytest.mark.parametrize("field", [name for name in TASK_FIELDS if name != "robot"])
 def test_a_card_says_every_field_that_the_policy_depends_on(field):
-    content = make_card().as_dict()
-    del content["config"][field]
+    content = make_card(config=JumpConfig.of(momentum_control=False)).as_dict()
+    *groups, name = path_to(field)
+    holder = content["config"]
+    for group in groups:
+        holder = holder[group]
+    del holder[name]
     with pytest.raises(ConfigError, match=f"a configuration with {field}"):
         PolicyCard.from_mapping(content)
+
+
+FLAT = {
+    "jump_height": [0.04, 0.08], "com_displacement": 0.09, "com_scaling": "displacement",
+    "controller": "torque", "momentum_control": False, "solver": "osqp",
+    "residual_scale": [0.05, 0.02, 0.01], "residual_phases": "launch", "control_frequency": None,
+    "agent_frequency": 50.0, "timestep": 0.001, "ankle_shift": True, "actuators": "realistic",
+    "sensors": "realistic", "command_delay": 0, "randomization": "hard", "stand_time": 1.5,
+    "render_mode": None,
+}  # fmt: skip
+"""As cards had it before the configuration had groups, and a choice of the robot."""
+
+
+def test_a_card_without_groups_is_read_and_is_of_the_robot_there_was():
+    card = make_card(config=FLAT)
+    assert card.config == JumpConfig.of(**FLAT)
+    assert card.config.residual.scale == (0.05, 0.02, 0.01)
+    assert card.config.success.stand_time == 1.5
+    assert not card.config.controller_config.momentum_control
+    assert card.config.controller_config.solver == "osqp"
+    assert card.config.robot == "iCubGenova04"
+    check_match(card, JumpConfig.of(**FLAT))
+    with pytest.raises(PolicyMismatchError, match="robot='iCubGazeboV2_5' instead of"):
+        check_match(card, JumpConfig.of(**FLAT, robot="iCubGazeboV2_5"))
+    assert through_json(card) == card
+
+
+@pytest.mark.parametrize("field", ["residual_scale", "residual_phases", "agent_frequency"])
+def test_a_card_without_groups_says_every_field_too(field):
+    less = {name: value for name, value in FLAT.items() if name != field}
+    with pytest.raises(ConfigError, match=f"a configuration with {field}"):
+        make_card(config=less)
 
 
 def test_a_message_shows_no_more_than_the_beginning_of_a_long_value():

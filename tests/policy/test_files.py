@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import pickle
+import stat
 import zipfile
 from pathlib import Path
 
@@ -14,12 +15,8 @@ from safetensors.numpy import save
 
 from icub_jump_env import files as package_files
 from icub_jump_env.errors import ICubJumpError, PolicyFileError
-from icub_jump_env.policy.files import (
-    MAX_CARD_DEPTH,
-    MAX_CARD_SIZE,
-    load_tensors,
-    save_tensors,
-)
+from icub_jump_env.files import MAX_DEPTH
+from icub_jump_env.policy.files import MAX_CARD_SIZE, load_tensors, save_tensors
 
 TENSORS = {
     "weights": np.arange(6, dtype=np.float32).reshape(2, 3),
@@ -111,7 +108,7 @@ def test_truncated_anywhere(path):
     text = card.read_bytes()
     for length in (0, 1, len(text) // 2, len(text) - 2):
         card.write_bytes(text[:length])
-        assert refused(path, "not JSON").path == str(card)
+        assert refused(path, "not readable as JSON").path == str(card)
 
 
 def test_any_flipped_bit(path):
@@ -146,11 +143,11 @@ def test_a_card_with_another_hash_or_none(path, digest):
     [
         (b"[1, 2]", "not a JSON object"),
         (b"null", "not a JSON object"),
-        (b"{'a': 1}", "not JSON"),
-        (b'{"a": "\xff"}', "not JSON"),
-        (b'{"a": ' + b"9" * 10_000 + b"}", "not JSON"),
-        (b"[" * 100_000 + b"]" * 100_000, "not JSON"),
-        (b'{"a": ' + b"[" * MAX_CARD_DEPTH + b"]" * MAX_CARD_DEPTH + b"}", "nested more than"),
+        (b"{'a': 1}", "not readable as JSON"),
+        (b'{"a": "\xff"}', "not readable as JSON"),
+        (b'{"a": ' + b"9" * 10_000 + b"}", "not readable as JSON"),
+        (b"[" * 100_000 + b"]" * 100_000, "nested more than 32 deep"),
+        (b'{"a": ' + b"[" * MAX_DEPTH + b"]" * MAX_DEPTH + b"}", "nested more than"),
         (b'{"a": "' + b"x" * MAX_CARD_SIZE + b'"}', "larger than 1048576 bytes"),
     ],
 )
@@ -161,7 +158,7 @@ def test_cards_that_are_something_else(path, text, match):
 
 def test_the_deepest_card_can_be_read(path):
     deep = []
-    for _ in range(MAX_CARD_DEPTH - 2):
+    for _ in range(MAX_DEPTH - 2):
         deep = [deep]
     save_tensors(path, TENSORS, {"deep": deep})
     assert load_tensors(path)[1]["deep"] == deep
@@ -246,6 +243,40 @@ def test_what_could_not_be_read_back_is_not_written(path, tensors, card, match):
     with pytest.raises(PolicyFileError, match=match):
         save_tensors(path, tensors, card)
     assert contents(path.parent) == before
+
+
+def test_names_reach_the_disk_one_after_the_other(tmp_path, monkeypatch):
+    """A folder is synced after each rename, so that a power cut keeps their order."""
+    calls, replace, sync = [], Path.replace, os.fsync
+
+    def watched_replace(self, target):
+        calls.append(target.name)
+        return replace(self, target)
+
+    def watched_sync(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            calls.append(os.fstat(descriptor).st_ino)
+        sync(descriptor)
+
+    monkeypatch.setattr(Path, "replace", watched_replace)
+    monkeypatch.setattr(os, "fsync", watched_sync)
+    (tmp_path / "b").mkdir()
+    package_files.write_files({tmp_path / "first": b"1", tmp_path / "b" / "second": b"2"})
+    folders = [tmp_path.stat().st_ino, (tmp_path / "b").stat().st_ino]
+    assert calls == ["first", folders[0], "second", folders[1]]
+
+
+def test_a_folder_that_cannot_be_synced_is_no_error(tmp_path, monkeypatch):
+    sync = os.fsync
+
+    def refuse(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "Invalid argument")
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    package_files.write_file(tmp_path / "file", b"1")
+    assert (tmp_path / "file").read_bytes() == b"1"
 
 
 @pytest.mark.parametrize("failing", [0, 1])

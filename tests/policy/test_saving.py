@@ -18,10 +18,10 @@ from icub_jump_env.errors import (
     PolicyMismatchError,
 )
 from icub_jump_env.observation import entry_scales
-from icub_jump_env.policy import ReplayPolicy, load_policy, save_policy
+from icub_jump_env.policy import ReplayPolicy, load_policy, save_policy, shipped_policies
 from icub_jump_env.policy.fields import MAX_HIDDEN, MAX_WIDTH
 from icub_jump_env.policy.replay import MAX_COMMANDS, MAX_STEPS
-from icub_jump_env.policy.saving import MAX_POLICY_SIZE
+from icub_jump_env.policy.saving import MAX_POLICY_SIZE, SHIPPED
 
 
 @pytest.fixture(params=POLICIES)
@@ -207,3 +207,36 @@ def test_hostile_cards_lead_to_typed_errors(tmp_path_factory, key, value):
         assert (np.abs(action) <= 1.0).all()
     except ICubJumpError:
         pass
+
+
+KINDS = {"": "network", "-constant": "network", "-open-loop": "replay"}
+
+
+def test_the_shipped_policies_are_those_of_both_controllers():
+    assert shipped_policies() == [
+        f"{controller}{kind}" for controller in ("torque", "velocity") for kind in KINDS
+    ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("controller", ["torque", "velocity"])
+def test_a_shipped_policy_is_read_by_its_name(controller, kind, rng):
+    name = f"{controller}{kind}"
+    loaded = load_policy(name)
+    file = SHIPPED / f"{name}.safetensors"
+    assert loaded.card == load_policy(file).card
+    assert loaded.card.sha256 == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert loaded.card.kind == KINDS[kind]
+    assert loaded.card.config.controller_name == controller
+    obs = random_observation(rng)
+    assert loaded(obs).tobytes() == load_policy(file)(obs).tobytes()
+    assert loaded(obs).any()
+    load_policy(name, loaded.card.config)
+    with pytest.raises(PolicyMismatchError, match="ankle_shift"):
+        load_policy(name, loaded.card.config.replace(ankle_shift=False))
+
+
+@pytest.mark.parametrize("name", ["spring", "torque2", "../shipped/torque", ""])
+def test_another_name_is_that_of_a_file(name):
+    with pytest.raises(PolicyFileError):
+        load_policy(name)

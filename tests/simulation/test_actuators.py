@@ -28,8 +28,12 @@ zeros, ones = np.zeros(N), np.ones(N)
 vectors = st.integers(0, 10_000).map(lambda seed: np.random.default_rng(seed).normal(size=N))
 
 
+def of(config, strength=ones, gain_scale=ones) -> Actuators:
+    return Actuators(config, ROBOT, DT, strength, gain_scale)
+
+
 def actuators(position=zeros, torque=zeros, **models) -> Actuators:
-    made = Actuators(ActuatorConfig(**models), DT)
+    made = of(ActuatorConfig(**models))
     made.reset(position, torque)
     return made
 
@@ -43,7 +47,7 @@ def joint_torque(made, position, velocity):
 class TestLimits:
     @given(vectors, vectors, vectors, st.floats(0.0, 50.0), st.sampled_from(sorted(ACTUATORS)))
     def test_motor_torque_stays_within_the_limits(self, position, velocity, command, size, name):
-        made = Actuators(ACTUATORS[name], DT)
+        made = of(ACTUATORS[name])
         made.reset(zeros, zeros)
         for wanted in (JointCommand(size * command), JointCommand(torque=size * 10 * command)):
             made.command(wanted)
@@ -63,7 +67,7 @@ class TestLimits:
 
     def test_weak_motors_give_their_share(self, rng):
         strength = rng.uniform(0.5, 1.0, N)
-        made = Actuators(ActuatorConfig(), DT, strength=strength)
+        made = of(ActuatorConfig(), strength=strength)
         made.reset(zeros, zeros)
         made.command(JointCommand(torque=1e3 * ones))
         np.testing.assert_allclose(made.torque(zeros, zeros), strength * ROBOT.effort_limit)
@@ -85,7 +89,7 @@ class TestLimits:
     @pytest.mark.parametrize("motor", [RatedMotor(), DCMotor()])
     def test_weak_motors_are_weak_at_every_speed(self, rng, motor):
         strength = rng.uniform(0.5, 1.0, N)
-        weak = Actuators(ActuatorConfig(motor=motor), DT, strength=strength)
+        weak = of(ActuatorConfig(motor=motor), strength=strength)
         strong = actuators(motor=motor)
         for speed in (0.0, 0.97, 1.01):
             for made in (weak, strong):
@@ -116,7 +120,7 @@ class TestServo:
         """A joint of known inertia under a constant load reaches the commanded velocity."""
         inertia, load = ROBOT.armature + 0.05, 0.3 * ROBOT.effort_limit
         goal = 0.3 * ROBOT.velocity_limit * np.sign(rng.normal(size=N))
-        made = Actuators(ACTUATORS[name], DT)
+        made = of(ACTUATORS[name])
         made.reset(zeros, zeros)
         made.command(JointCommand(goal))
         s, s_dot = np.zeros(N), np.zeros(N)
@@ -132,7 +136,7 @@ class TestServo:
 
     def test_gains_are_scaled_per_joint(self, rng):
         scale = rng.uniform(0.5, 1.5, N)
-        made = Actuators(ActuatorConfig(), DT, gain_scale=scale)
+        made = of(ActuatorConfig(), gain_scale=scale)
         made.reset(zeros, zeros)
         made.command(JointCommand(zeros, position=np.full(N, 0.001)))
         gains = ServoGains()

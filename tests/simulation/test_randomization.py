@@ -14,7 +14,6 @@ from icub_jump_env.robot import icub
 from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import (
-    BIASED_JOINTS,
     RANDOMIZATIONS,
     Randomization,
     draw_world,
@@ -29,7 +28,7 @@ seeds = st.integers(0, 2**31)
 
 
 def draw(ranges, seed):
-    return draw_world(ranges, LINKS, np.random.default_rng(seed))
+    return draw_world(ranges, ROBOT, LINKS, np.random.default_rng(seed))
 
 
 class TestRanges:
@@ -89,13 +88,13 @@ class TestDraws:
             if name == "payload_offset":
                 drawn = np.linalg.norm(drawn)
             if name == "encoder_bias":
-                drawn = drawn[list(BIASED_JOINTS)]
+                drawn = drawn[ROBOT.leg_pitch_joints]
             low, high = getattr(ranges, name)
             assert (drawn >= low).all()
             assert (drawn <= high).all()
         assert isinstance(world.delay, int)
         assert 0.0 <= world.push_time < 1.0
-        unbiased = np.delete(world.encoder_bias, list(BIASED_JOINTS))
+        unbiased = np.delete(world.encoder_bias, ROBOT.leg_pitch_joints)
         assert not unbiased.any()
 
     @given(seeds, st.sampled_from(FIELDS))
@@ -150,9 +149,10 @@ def physics():
 
 def applied(physics, **changes):
     world = dataclasses.replace(
-        draw_world(Randomization(), physics.model.nbody - 1, np.random.default_rng(0)), **changes
+        draw_world(Randomization(), ROBOT, physics.model.nbody - 1, np.random.default_rng(0)),
+        **changes,
     )
-    variation = ModelVariation(physics.model)
+    variation = ModelVariation(physics.model, ROBOT)
     variation.apply(world, physics.model)
     return physics.model
 
@@ -178,8 +178,10 @@ class TestModel:
             np.testing.assert_array_equal(getattr(model, name), values, err_msg=name)
 
     def test_worlds_do_not_add_up(self, physics):
-        rng, variation = np.random.default_rng(1), ModelVariation(physics.model)
-        worlds = [draw_world(RANDOMIZATIONS["hard"], physics.model.nbody - 1, rng) for _ in "ab"]
+        rng, variation = np.random.default_rng(1), ModelVariation(physics.model, ROBOT)
+        worlds = [
+            draw_world(RANDOMIZATIONS["hard"], ROBOT, physics.model.nbody - 1, rng) for _ in "ab"
+        ]
         variation.apply(worlds[0], physics.model)
         once = physics.model.body_inertia.copy(), physics.model.body_ipos.copy()
         variation.apply(worlds[1], physics.model)

@@ -59,7 +59,7 @@ def test_video_is_recorded(offscreen, tmp_path):
         "from pathlib import Path\n"
         "import imageio.v3 as iio\n"
         f"file = Path({str(file)!r})\n"
-        "record_video(file, JumpConfig(stand_time=0.1, agent_frequency=25.0), 0, Console())\n"
+        "record_video(file, JumpConfig.of(stand_time=0.1, agent_frequency=25.0), 0, Console())\n"
         "print(*iio.imread(file).shape)\n"
     )
     result = subprocess.run(
@@ -107,3 +107,30 @@ def test_two_environments_render_side_by_side(offscreen):
         "envs[1].close()\n"
     )
     subprocess.run([sys.executable, "-c", program], env=offscreen, check=True)
+
+
+def test_size_and_camera_are_those_asked_for(offscreen):
+    """Through gymnasium.make, by shortcuts and as a group."""
+    program = (
+        "import gymnasium, icub_jump_env, numpy as np\n"
+        "def picture(**given):\n"
+        "    env = gymnasium.make('ICubJump-v0', **given)\n"
+        "    env.reset(seed=0)\n"
+        "    shown = env.render()\n"
+        "    env.close()\n"
+        "    return shown\n"
+        "size = {'width': 160, 'height': 96}\n"
+        "shown = [\n"
+        "    picture(render_mode='rgb_array', **size),\n"
+        "    picture(render_mode='rgb_array', camera='front', **size),\n"
+        "    picture(rendering={'mode': 'rgb_array', 'camera': 'profile', **size}),\n"
+        "]\n"
+        "assert all(p.shape == (96, 160, 3) for p in shown)\n"
+        "for one, other in ((0, 1), (1, 2), (2, 0)):\n"
+        "    differs = (shown[one] != shown[other]).any(axis=2)\n"
+        "    assert differs.mean() > 0.05, (one, other)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", program], env=offscreen, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import Randomization, draw_world
@@ -21,7 +22,7 @@ from icub_jump_env.simulation.sensors import Sensors
 
 ROBOT = load_robot()
 
-NOMINAL = draw_world(Randomization(), 1, np.random.default_rng(0))
+NOMINAL = draw_world(Randomization(), ROBOT, 1, np.random.default_rng(0))
 zeros = np.zeros(ROBOT.n_joints)
 
 
@@ -40,9 +41,8 @@ def sensors(physics, seed=0, world=NOMINAL, **config) -> Sensors:
 
 
 def readings(made):
-    made.read()
-    names = ("joint_position", "joint_velocity", "gravity", "gyro", "foot_force")
-    return {name: getattr(made, name).copy() for name in names}
+    taken = made.read()
+    return {name: getattr(taken, name).copy() for name in Readings.__slots__}
 
 
 READING = {"joint_position": "joint_position", "joint_velocity": "joint_velocity",
@@ -88,7 +88,10 @@ def test_drift_grows_linearly(physics):
         offsets.append(readings(made)["foot_force"])
     physics.data.time = start
     np.testing.assert_allclose(offsets[0], 0.0)
-    np.testing.assert_allclose(offsets[2], 2 * offsets[1])
+    vertical = np.array(made.drawn()["force"]["drift"]).reshape(2, 3)[:, 2]
+    assert np.abs(vertical).min() > 0.1
+    np.testing.assert_allclose(offsets[1], vertical)
+    np.testing.assert_allclose(offsets[2], 2 * vertical)
     rates = []
     for seed in range(200):
         made.reset(NOMINAL, seed)

@@ -6,7 +6,6 @@ from typing import Protocol
 
 import daqp
 import numpy as np
-import osqp
 import scipy.sparse as sp
 
 from icub_jump_env.control.config import SolverName
@@ -77,6 +76,8 @@ class OSQPSolver:
     _RHO = 1.0
 
     def __init__(self, problem: QuadraticProgram) -> None:
+        import osqp  # takes long, and the default solver needs none of it
+
         self._problem = problem
         n, m = problem.n, problem.C.shape[0]
         # OSQP wants the upper triangle, column by column, with a fixed pattern.
@@ -93,10 +94,10 @@ class OSQPSolver:
         self._solver = osqp.OSQP()
         self._solver.setup(
             P,
-            problem.g,
+            np.zeros(n),
             A,
-            problem.lower,
-            problem.upper,
+            np.zeros(n + m),
+            np.zeros(n + m),
             eps_abs=1e-9,
             eps_rel=1e-9,
             max_iter=20000,
@@ -112,6 +113,8 @@ class OSQPSolver:
     def solve(self) -> QPSolution:
         """Solve the problem as it stands."""
         p = self._problem
+        if not self._solvable():
+            return QPSolution(np.zeros(p.n), np.zeros(p.lower.size), QPStatus.SOLVER_ERROR, 0)
         self._stacked[p.n :] = p.C
         self._solver.update(
             Px=p.H[self._upper_triangle],
@@ -134,6 +137,18 @@ class OSQPSolver:
         return QPSolution(
             np.asarray(result.x), np.asarray(result.y), status, int(result.info.iter)
         )
+
+    def _solvable(self) -> bool:
+        """Whether OSQP takes the problem; else it prints a complaint, whatever its settings."""
+        p = self._problem
+        if not all(np.isfinite(x).all() for x in (p.H, p.g, p.C)):
+            return False
+        try:
+            # The bounds on the variables add rho to the diagonal of what OSQP factorises.
+            np.linalg.cholesky(p.H + self._RHO * np.eye(p.n))
+        except np.linalg.LinAlgError:
+            return False
+        return bool((p.lower <= p.upper).all())
 
 
 SOLVERS: dict[SolverName, type[DAQPSolver] | type[OSQPSolver]] = {

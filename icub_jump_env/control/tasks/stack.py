@@ -107,7 +107,7 @@ class TaskQP:
         np.matmul(rows.T, rows, out=problem.H)
         self._H_diagonal += self._diagonal
         gradient = problem.g
-        gradient[:] = 0.0
+        gradient.fill(0.0)
         for cost in self._costs:
             cost.subtract(state, setpoint, gradient)
         gradient -= target.dot(rows)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from icub_jump_env import policy
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import ConfigError
+from icub_jump_env.errors import ConfigError, printable
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import Policy, PolicyCard, load_policy
 from icub_jump_env.policy.card import TASK_FIELDS
@@ -51,8 +51,9 @@ def read_contenders(words: Sequence[str]) -> list[Contender]:
     """The contenders of a command line.
 
     Args:
-        words: The word baseline, and policy files. A file is called by its stem; where
-            several would be called the same, by the name of its folder as well.
+        words: The word baseline, and policy files. A file is called by its stem, in
+            printable characters; where several would be called the same, by the name of its
+            folder as well.
 
     Raises:
         PolicyFileError: If a file is missing, damaged, or not a policy.
@@ -68,7 +69,7 @@ def read_contenders(words: Sequence[str]) -> list[Contender]:
         loaded = load_policy(path)
         alone = called[path.stem] == 1
         name = path.stem if alone else f"{path.absolute().parent.name}-{path.stem}"
-        contenders.append(Contender(name, loaded, loaded.card))
+        contenders.append(Contender(printable(name), loaded, loaded.card))
     if len({contender.name for contender in contenders}) < len(contenders):
         raise ConfigError("compare", tuple(words), "policies of different names")
     return contenders

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,12 +12,12 @@ from typing import Any
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.files import strict_json, write_file
+from icub_jump_env.files import read_json, strict_json, write_file
 from icub_jump_env.metrics.jump import UNDEFINED, JumpMetrics
 
 
 class EpisodeLog:
-    """A JSON Lines file: what was asked for, then one episode per line.
+    """A JSON Lines file: what was asked for, then one episode per line, each with a checksum.
 
     Lines come in the order in which episodes end. A finished log is sorted by seed, so
     that it does not matter how many processes worked on it and how often it was
@@ -25,6 +27,7 @@ class EpisodeLog:
         path: The file.
         episodes: Episodes in it, by seed.
         kept: Where an existing log was put, if one was in the way.
+        damaged: Lines that were dropped because they are no episode, or not as written.
     """
 
     def __init__(self, path: Path, header: Mapping[str, Any], resume: bool) -> None:
@@ -41,14 +44,15 @@ class EpisodeLog:
         """
         self.path = path
         self.episodes: dict[int, Episode] = {}
-        self._header = strict_json(header)
+        self._header = _sealed(header)
         self.kept: Path | None = None
+        self.damaged = 0
         if resume and not path.exists():
             raise ConfigError("resume", str(path), "a log that exists")
         if path.exists():
-            old_header, episodes = self._read()
+            old_header, lines = self._read()
             if resume:
-                self._take(old_header, episodes)
+                self._take(old_header, header, lines)
             else:
                 self.kept = _unused(path)
                 path.rename(self.kept)
@@ -70,29 +74,60 @@ class EpisodeLog:
         lines = [self._header, *(_line(self.episodes[seed]) for seed in sorted(self.episodes))]
         write_file(self.path, "".join(line + "\n" for line in lines).encode())
 
-    def _read(self) -> tuple[dict[str, Any], list[Episode]]:
+    def _read(self) -> tuple[dict[str, Any], list[bytes]]:
+        """What the log answers, and the lines of its episodes."""
+        # The last part is empty, or a line that was cut off.
+        first, *others = self.path.read_bytes().split(b"\n")
         try:
-            # The last part is empty, or a line that was cut off.
-            *lines, _ = self.path.read_text().split("\n")
-            header, *entries = (json.loads(line) for line in lines)
-            if not isinstance(header, dict) or "episodes" not in header:
+            header = _unsealed(first)
+            if "episodes" not in header:
                 raise ValueError
-            return header, [_episode(entry) for entry in entries]
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        except ValueError:
             raise ConfigError(
                 "results", str(self.path), "a log of eval.py, or a new file"
             ) from None
+        return header, others[:-1]
 
-    def _take(self, old_header: Mapping[str, Any], episodes: Sequence[Episode]) -> None:
-        header = json.loads(self._header)
+    def _take(
+        self, old_header: Mapping[str, Any], header: Mapping[str, Any], lines: Sequence[bytes]
+    ) -> None:
+        header = json.loads(strict_json(header))
+        for line in lines:
+            try:
+                episode = _episode(_unsealed(line))
+            except (ValueError, TypeError, KeyError, AttributeError):
+                self.damaged += 1
+            else:
+                self.episodes[episode.seed] = episode
         differing = _differences(old_header, header)
         first = header.get("seed", 0)
-        if not {e.seed for e in episodes} <= set(range(first, first + header["episodes"])):
+        if not self.episodes.keys() <= set(range(first, first + header["episodes"])):
             differing.append("seeds")
         if differing:
             allowed = f"a log of the same evaluation; different: {', '.join(differing)}"
             raise ConfigError("resume", str(self.path), allowed)
-        self.episodes = {episode.seed: episode for episode in episodes}
+
+
+_SEAL = re.compile(rb'(\{.*), "crc32": "([0-9a-f]{8})"\}', re.DOTALL)
+
+
+def _sealed(entry: Mapping[str, Any]) -> str:
+    """A line that tells of damage: JSON with the checksum of the rest as its last entry."""
+    rest = strict_json(entry)[:-1]
+    return f'{rest}, "crc32": "{zlib.crc32(rest.encode()):08x}"}}'
+
+
+def _unsealed(line: bytes) -> dict[str, Any]:
+    """The entry of a line.
+
+    Raises:
+        ValueError: If it is no such line, or not as it was written.
+    """
+    seal = _SEAL.fullmatch(line)
+    if seal is None or zlib.crc32(seal[1]) != int(seal[2], 16):
+        raise ValueError
+    entry: dict[str, Any] = read_json(seal[1] + b"}")
+    return entry
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
@@ -108,7 +143,7 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 
 def _line(episode: Episode) -> str:
-    return strict_json({name: value for name, value in vars(episode).items() if name != "trace"})
+    return _sealed({name: value for name, value in vars(episode).items() if name != "trace"})
 
 
 def _episode(entry: dict[str, Any]) -> Episode:

@@ -70,6 +70,9 @@ class Series:
         log = EpisodeLog(path, header, resume)
         if log.kept is not None:
             say(progress, f"kept the earlier episodes in {log.kept}")
+        if log.damaged:
+            lines = "1 damaged line" if log.damaged == 1 else f"{log.damaged} damaged lines"
+            say(progress, f"dropped {lines} of {log.path}: what is missing is jumped again")
         missing = [seed for seed in self.seeds if seed not in log.episodes]
         work = [Job(self.config, seed, self.contender.policy) for seed in missing]
         with progress_display(progress) as display:

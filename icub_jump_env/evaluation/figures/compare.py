@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.figures.style import CONTENDERS, Figure, panels
@@ -22,6 +25,8 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
     """
     figure, ((left, right),) = panels((9.0, 3.8), columns=2)
     shift = 0.8 / len(episodes)
+    bars: list[Artist] = []
+    fallen: dict[str, Artist] = {}
     for number, (name, series) in enumerate(episodes.items()):
         color = CONTENDERS[number % len(CONTENDERS)]
         groups = by_command(series)
@@ -30,28 +35,42 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
         shares = np.array([PERCENT * rate.share for rate in rates])
         bounds = np.array([rate.interval for rate in rates]).T * PERCENT
         errors = np.abs(bounds - shares)
-        left.bar(places, shares, 0.9 * shift, yerr=errors, color=color, label=name, capsize=2)
+        bar = left.bar(
+            places, shares, 0.9 * shift, yerr=errors, color=color, label=name, capsize=2
+        )
+        bars.append(bar.patches[0])
         names = [text.removesuffix(" cm") for text in command_labels(series).values()]
         left.set_xticks(range(len(groups)), names)
         for landed, marker in ((True, "."), (False, "x")):
             shown = [e for e in series if e.jump["landed"] == landed]
             if not shown:
                 continue
-            right.plot(
+            (points,) = right.plot(
                 [CM * e.jump_height for e in shown],
                 [CM * e.jump["flight_height"] for e in shown],
                 marker,
                 ms=4,
                 alpha=0.7,
                 color=color,
-                label=None if landed else f"{name}, fallen",
             )
+            if not landed:
+                fallen[f"{name}, fallen"] = points
     commands = [CM * e.jump_height for series in episodes.values() for e in series]
     ends = np.array([min(commands), max(commands)])
-    right.plot(ends, ends, color="k", lw=0.8, label="command")
-    right.plot(ends, success.height_ratio * ends, "k:", lw=0.8, label="least for a success")
+    lines = {
+        "command": right.plot(ends, ends, color="k", lw=0.8)[0],
+        "least for a success": right.plot(ends, success.height_ratio * ends, "k:", lw=0.8)[0],
+    }
     left.set(xlabel="command (cm)", ylabel="success (%)", ylim=(0, 103))
     right.set(xlabel="command (cm)", ylabel="CoM rise (cm)")
-    left.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
-    right.legend(frameon=False, fontsize=8)
+    above = {"ncols": 3, "loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+    _name(left, dict(zip(episodes, bars, strict=True)), **above)
+    _name(right, fallen | lines)
     return figure
+
+
+def _name(axis: Axes, artists: Mapping[str, Artist], **place: Any) -> None:
+    """A legend that shows names as they are: matplotlib takes some signs in them for its own."""
+    legend = axis.legend(artists.values(), artists.keys(), frameon=False, fontsize=8, **place)
+    for text in legend.get_texts():
+        text.set_parse_math(False)

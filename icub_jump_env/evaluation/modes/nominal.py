@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from icub_jump_env.config import JumpConfig
@@ -134,7 +135,7 @@ def run(
         column = f"{'no' if _constrained(config) else 'with'} eq. {equation}"
     else:
         launch = f"{CM * planned(config).displacement:.3g} cm"
-        title, column = f"{title} with {contender.name}, after {launch}", "baseline"
+        title, column = f"{title} with {escape(contender.name)}, after {launch}", "baseline"
     show(console, render_table(rows, f"{title}; the paper's: 4 cm after 11 cm", column))
     if contender.is_baseline:
         say(console, verdict(config, ours.episode, other.episode))

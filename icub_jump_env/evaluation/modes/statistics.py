@@ -45,12 +45,13 @@ def run(
     title, table, lines = render(episodes, options, contender)
     say(console, title)
     show(console, table)
-    say(console, lines)
+    for line in lines:
+        say(console, line)
 
 
 def render(
     episodes: Sequence[Episode], options: EvalOptions, contender: Contender
-) -> tuple[str, Table, str]:
+) -> tuple[str, Table, list[str]]:
     """What the terminal shows: title, metrics, rates and failures.
 
     Of a single episode there is nothing but its values.
@@ -81,7 +82,7 @@ def render(
         if options.policy is not None:
             words += f" --policy {shlex.quote(str(options.policy))}"
         lines.append(f"replay one: python eval.py {words} --view")
-    return title, table, "\n".join(lines)
+    return title, table, lines
 
 
 def replay_arguments(config: JumpConfig, seed: int) -> str:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import Progress, ProgressColumn
 from rich.table import Table
 
-from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.errors import ConfigError, MissingDependencyError, printable
 from icub_jump_env.evaluation.report.provenance import command, provenance
 from icub_jump_env.files import strict_json, write_file
 
@@ -27,8 +27,8 @@ def progress_display(console: Console, *columns: ProgressColumn) -> Progress:
 
 
 def say(console: Console, text: str) -> None:
-    """Print a line as it is: not wrapped, and nothing in it taken for markup."""
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
+    """Print a line: not wrapped, and nothing in it obeyed by the terminal or taken for markup."""
+    console.print(printable(text), soft_wrap=True, markup=False, highlight=False)
 
 
 def new_table(names: int, *columns: str, title: str | None = None) -> Table:

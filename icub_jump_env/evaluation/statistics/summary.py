@@ -15,7 +15,12 @@ from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.quantities import CM, PERCENT, QUANTITIES, commands
 from icub_jump_env.evaluation.statistics.intervals import Interval, wilson_interval
 
-_METRICS = (*(metric for _, metric, _ in QUANTITIES), "landing_force", "joint_work")
+_METRICS = (
+    *(metric for _, metric, _ in QUANTITIES),
+    "landing_force",
+    "joint_work",
+    "solver_failures",
+)
 
 
 @dataclass(frozen=True)

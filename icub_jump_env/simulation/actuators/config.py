@@ -52,7 +52,9 @@ class ActuatorConfig:
         check_type("servo", self.servo, ServoGains)
         check_type("torque_loop", self.torque_loop, IdealTorque, TorqueFeedback, CurrentControl)
         check_type("motor", self.motor, RatedMotor, DCMotor)
-        store(self, friction=check_number("friction", self.friction, 0.0, 0.2))
+        store(
+            self, friction=check_number("friction", self.friction, 0.0, 0.2, "of the effort limit")
+        )
 
 
 ACTUATORS: Mapping[ActuatorName, ActuatorConfig] = MappingProxyType(

@@ -41,7 +41,12 @@ class RatedMotor:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("rated",))
-        store(self, speed_band=check_number("speed_band", self.speed_band, 1e-3, 1.0))
+        store(
+            self,
+            speed_band=check_number(
+                "speed_band", self.speed_band, 1e-3, 1.0, "of the speed limit"
+            ),
+        )
 
     def make(self, robot: Robot, strength: Array) -> Motor:
         """The motors; ``strength`` is the (n,) share of their largest torque that they reach."""
@@ -83,10 +88,13 @@ class DCMotor:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("dc",))
-        store(self, current_limit=check_number("current_limit", self.current_limit, 0.01, 1.0))
-        store(self, voltage_limit=check_number("voltage_limit", self.voltage_limit, 0.01, 1.0))
-        store(self, stall_torque=check_number("stall_torque", self.stall_torque, 1.0, 100.0))
-        store(self, no_load_speed=check_number("no_load_speed", self.no_load_speed, 0.1, 10.0))
+        for name, low, high, unit in (
+            ("current_limit", 0.01, 1.0, "of the largest current"),
+            ("voltage_limit", 0.01, 1.0, "of the full voltage"),
+            ("stall_torque", 1.0, 100.0, "effort limits"),
+            ("no_load_speed", 0.1, 10.0, "speed limits"),
+        ):
+            store(self, **{name: check_number(name, getattr(self, name), low, high, unit)})
 
     def make(self, robot: Robot, strength: Array) -> Motor:
         """The motors; ``strength`` is the (n,) share of their largest torque that they reach."""

@@ -29,8 +29,8 @@ class ServoGains:
     damping: float = 50.0
 
     def __post_init__(self) -> None:
-        store(self, stiffness=check_number("stiffness", self.stiffness, 1e-3, 1e6))
-        store(self, damping=check_number("damping", self.damping, 0.0, 1e5))
+        store(self, stiffness=check_number("stiffness", self.stiffness, 1e-3, 1e6, "Nm/rad"))
+        store(self, damping=check_number("damping", self.damping, 0.0, 1e5, "Nm s/rad"))
 
 
 class JointServo:

@@ -75,8 +75,8 @@ class TorqueFeedback:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("feedback",))
-        store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1000.0))
-        store(self, delay=check_number("delay", self.delay, 0.0, 0.1))
+        store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1000.0, "Hz"))
+        store(self, delay=check_number("delay", self.delay, 0.0, 0.1, "s"))
 
     def make(self, dt: float, n_joints: int) -> TorqueLoop:
         """The loops of ``n_joints`` joints at a physics step of ``dt`` (s)."""
@@ -109,15 +109,18 @@ class CurrentControl:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("current",))
-        store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1e4))
+        store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1e4, "Hz"))
         store(
             self,
             friction_compensation=check_number(
-                "friction_compensation", self.friction_compensation, 0.0, 1.5
+                "friction_compensation", self.friction_compensation, 0.0, 1.5, "of the friction"
             ),
         )
         store(
-            self, torque_constant=check_number("torque_constant", self.torque_constant, 0.5, 1.5)
+            self,
+            torque_constant=check_number(
+                "torque_constant", self.torque_constant, 0.5, 1.5, "of the assumed one"
+            ),
         )
 
     def make(self, dt: float, n_joints: int) -> TorqueLoop:

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
 import io
 import logging
 import queue
+import secrets
 import socket
+from collections.abc import Callable
+from http import HTTPStatus
 from typing import Any
+from urllib.parse import parse_qs
 
 import mujoco
 from mujoco.studio import launch_thread, messages, plugin, viewer_protocol, web_viewer
 from mujoco.studio.dear_imgui import dear_imgui as imgui
+from mujoco.studio.web import web_server
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
 from icub_jump_env.simulation.viewers.screen import Caption, Command, CommandQueue, Screen
 
@@ -19,15 +27,97 @@ LOOPBACK = "127.0.0.1"
 
 _TITLE = "iCub jump"
 _MARGIN = 12.0
+_PATIENCE = 10.0
+"""Longest time (s) until the server answers for the first time."""
+
+_Process = Callable[[Any, Request], Response | None]
+
+
+class Gate:
+    """Lets in who knows the address that was printed, and takes no files.
+
+    The address holds a token; the page's own requests, which lack it, carry the cookie that
+    the page brought. Neither other users nor other sites' pages have either. Requests by
+    another name of this machine, or from another site's page, are refused in any case.
+
+    Attributes:
+        address: The page, with the token.
+    """
+
+    def __init__(self, port: int) -> None:
+        self._token = secrets.token_urlsafe(32)
+        # Cookies do not tell ports apart.
+        self._cookie = f"icub_jump_{port}"
+        self._hosts = [f"{name}:{port}" for name in (LOOPBACK, "localhost")]
+        self.address = f"http://{LOOPBACK}:{port}/?token={self._token}"
+
+    def before(self, process: _Process) -> _Process:
+        """``process``, for requests that are let in."""
+
+        def checked(connection: Any, request: Request) -> Response | None:
+            path, _, query = request.path.partition("?")
+            tokens = parse_qs(query).get("token", [])
+            if not self._admits(request, tokens) or path == "/drop":
+                return _refusal()
+            response = process(connection, request)
+            if tokens and response is not None:
+                response.headers["Set-Cookie"] = (
+                    f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+                )
+                response.headers["Referrer-Policy"] = "no-referrer"
+            return response
+
+        return checked
+
+    def _admits(self, request: Request, tokens: list[str]) -> bool:
+        headers = request.headers
+        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        if len(hosts) != 1 or hosts[0] not in self._hosts:
+            return False
+        if any(origin != f"http://{hosts[0]}" for origin in origins):
+            return False
+        cookies = [c.strip() for line in headers.get_all("Cookie") for c in line.split(";")]
+        known = [c.removeprefix(f"{self._cookie}=") for c in cookies if c.startswith(self._cookie)]
+        given = tokens or known
+        return any(secrets.compare_digest(t.encode(), self._token.encode()) for t in given)
+
+
+def _refusal() -> Response:
+    body = b"forbidden: open the address that the program printed\n"
+    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body))})
+    return Response(HTTPStatus.FORBIDDEN, HTTPStatus.FORBIDDEN.phrase, headers, body)
+
+
+class _GatedSocket(socket.socket):
+    """A listening socket with its gate."""
+
+    gate: Gate
+
+
+_serve = web_server.serve
+
+
+def _serve_gated(
+    *arguments: Any, sock: socket.socket, process_request: _Process, **options: Any
+) -> Any:
+    if isinstance(sock, _GatedSocket):
+        process_request = sock.gate.before(process_request)
+    return _serve(*arguments, sock=sock, process_request=process_request, **options)
+
+
+# Studio has no place for it. Whether it works is tried out before a viewer is used.
+web_server.serve = _serve_gated
 
 
 class LoopbackViewer(web_viewer.WebViewer):  # type: ignore[misc]
     """Studio's web viewer, for this machine alone.
 
-    Studio listens on every interface and asks for no password.
+    Studio listens on every interface, asks for no password and loads models that are
+    dropped on the page.
 
     Attributes:
         port: Where the page is.
+        address: The same with the token.
     """
 
     @property
@@ -48,8 +138,11 @@ class LoopbackViewer(web_viewer.WebViewer):  # type: ignore[misc]
         if host != LOOPBACK:
             bound.close()
             raise OSError(f"MuJoCo Studio would listen on {host} instead of {LOOPBACK}")
-        bound.listen()  # a browser that comes before the server is up waits
-        self._checked_socket = bound
+        gated = _GatedSocket(fileno=bound.detach())
+        gated.gate = Gate(self.port)
+        self.address = gated.gate.address
+        gated.listen()  # a browser that comes before the server is up waits
+        self._checked_socket = gated
 
     def close(self) -> None:
         """Stop the server and free the interface."""
@@ -112,7 +205,7 @@ class BrowserScreen(Screen):
     """Serves a page on this machine that shows the jump.
 
     Attributes:
-        address: Where the page is.
+        address: Where the page is; whoever has it can open it.
     """
 
     def __init__(self, model: Any) -> None:
@@ -120,13 +213,16 @@ class BrowserScreen(Screen):
 
         Args:
             model: The model to show.
+
+        Raises:
+            OSError: If the server does not come up, or would let anybody in.
         """
         super().__init__(model)
         self._panel = Panel(self._commands)
         camera = mujoco.MjvCamera()
         self._stage.aim(camera)
         config = viewer_protocol.ViewerConfig(title=_TITLE, gfx="web", http_port=0)
-        started: queue.SimpleQueue[int | BaseException] = queue.SimpleQueue()
+        started: queue.SimpleQueue[LoopbackViewer | BaseException] = queue.SimpleQueue()
 
         def serve(endpoint: Any) -> None:
             try:
@@ -137,7 +233,7 @@ class BrowserScreen(Screen):
                     plugins=[self._panel],
                     camera=camera,
                 )
-                started.put(viewer.port)
+                started.put(viewer)
             except BaseException as error:
                 started.put(error)
                 raise
@@ -150,7 +246,12 @@ class BrowserScreen(Screen):
             outcome = started.get()
         if isinstance(outcome, BaseException):
             raise outcome
-        self.address = f"http://{LOOPBACK}:{outcome}/"
+        self.address = outcome.address
+        try:
+            _check_gate(outcome.port)
+        except OSError:
+            self.close()
+            raise
         # The viewer has this model already.
         self._handle.model, self._handle.data = self._stage.model, self._stage.data
 
@@ -166,3 +267,15 @@ class BrowserScreen(Screen):
     def close(self) -> None:
         """Stop the server."""
         self._handle.close()
+
+
+def _check_gate(port: int) -> None:
+    """See that a request without the token is refused.
+
+    Raises:
+        OSError: If it is not, or nobody answers.
+    """
+    with contextlib.closing(http.client.HTTPConnection(LOOPBACK, port, _PATIENCE)) as connection:
+        connection.request("GET", "/")
+        if connection.getresponse().status != HTTPStatus.FORBIDDEN:
+            raise OSError("MuJoCo Studio would show the jump to anybody on this machine")

@@ -40,15 +40,15 @@ class Standing:
         s[ROBOT.right_leg] += stance
         s[ROBOT.torso] += rng.normal(scale=spread, size=3)
         s[ROBOT.arms] += rng.normal(scale=spread, size=8)
-        self.be(np.clip(s, ROBOT.lower_position + 0.05, ROBOT.upper_position - 0.05), rng)
+        s = np.clip(s, ROBOT.lower_position + 0.05, ROBOT.upper_position - 0.05)
+        # Joint velocities that leave the feet at rest.
+        self.kinematics.update(s)
+        _, _, Vt = np.linalg.svd(self.kinematics.J_feet)
+        self.be(s, Vt[6:].T @ (0.3 * rng.normal(size=N - 6)))
 
-    def be(self, s, rng=None):
-        """Take the posture ``s``, still or with joint velocities that leave the feet at rest."""
-        s_dot = np.zeros(N)
-        if rng is not None:
-            self.kinematics.update(s)
-            _, _, Vt = np.linalg.svd(self.kinematics.J_feet)
-            s_dot = Vt[6:].T @ (0.3 * rng.normal(size=N - 6))
+    def be(self, s, s_dot=None):
+        """Take the joint positions ``s``, still or with joint velocities."""
+        s_dot = np.zeros(N) if s_dot is None else s_dot
         self.state = self._estimator.estimate(Readings(s, s_dot))
         self.setpoint.com_position[:] = self.state.com
 
