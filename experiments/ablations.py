@@ -87,12 +87,13 @@ def compare_trainings(options: AblationOptions) -> None:
         if kind in CONTROLLERS:
             _add(table, f"{kind}, baseline", baseline)
         jumps = np.stack([_jumps(config, member, options, progress) for member in members])
-        _add(table, kind, jumps, baseline, [_minutes(member.name) for member in members])
+        name = f"{kind} (single seed)" if len(members) == 1 else kind
+        _add(table, name, jumps, baseline, [_minutes(member.name) for member in members])
     table.caption = (
         f"{seeds(TEST[: options.episodes])}; interquartile means over the training "
         "seeds; gain over the baseline in the same episodes, with its bootstrap interval of 95 %: "
-        "over training seeds and episodes (of few seeds: too narrow rather than too wide), or over "
-        "the episodes of a single training, whose luck it does not show"
+        "over training seeds and episodes (of few seeds: too narrow rather than too wide); single "
+        "seed: over the episodes of one training alone, so another seed may well differ by more"
     )
     show(console, table)
 

@@ -18,8 +18,13 @@ if TYPE_CHECKING:
     from experiments.frontier import Point
 
 
-def frontier_figure(points: Sequence[Point]) -> Figure:
-    """Mean rise over the success rate; labels name command and displacement (cm)."""
+def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
+    """Mean rise over the success rate; labels name command and displacement (cm).
+
+    Args:
+        points: The grid.
+        chosen: Those of it that meet the policy.
+    """
     figure, ((axis,),) = panels((6.5, 4.2))
     names = dict.fromkeys(point.contender.name for point in points)
     baseline, constant, _, policy, *_ = CONTENDERS
@@ -37,6 +42,15 @@ def frontier_figure(points: Sequence[Point]) -> Figure:
                 fontsize=7,
                 color=color,
             )
+    axis.plot(
+        [PERCENT * point.summary.success.share for point in chosen],
+        [CM * point.summary.mean_rise for point in chosen],
+        "o",
+        ms=11,
+        mfc="none",
+        mec="k",
+        label="meet the policy",
+    )
     axis.set(xlabel="success (%)", ylabel="mean CoM rise (cm)")
     axis.set_title("command / displacement (cm)", fontsize=9)
     axis.legend(frameon=False)

@@ -218,7 +218,7 @@ class TestCommand:
         )
         assert (
             "idle against baseline: success +0.0 points (95 % interval -39.2 to +39.2; won 0, "
-            "lost 0, McNemar p = 1.000), rise +0.00 cm (+0.00 to +0.00), "
+            "lost 0, McNemar p = 1.000, corrected p = 1.000), rise +0.00 cm (+0.00 to +0.00), "
             "soles +0.00 cm (+0.00 to +0.00)\n" in out
         )
         for name in ("baseline", "idle", "busy"):
@@ -229,6 +229,17 @@ class TestCommand:
         line = next(line for line in out.splitlines() if line.startswith("busy against baseline"))
         assert f"rise {100 * np.mean(gains):+.2f} cm" in line
         assert not [line for line in out.splitlines() if line.startswith("baseline against")]
+
+    def test_p_values_are_corrected_for_the_number_of_comparisons(self, capsys, asked):
+        _, out, _ = evaluate(capsys, *asked, "--json", "r.json")
+        assert out.endswith("\ncorrected p: Holm-corrected over 3 comparisons\n")
+        differences = json.loads(Path("r.json").read_text())["differences"]
+        assert all(pair["all"]["corrected_p_value"] is not None for pair in differences)
+
+    def test_a_single_comparison_needs_no_correction(self, capsys, files):
+        _, out, _ = evaluate(capsys, "--compare", "baseline", files[1], *FLAGS, "--episodes", "2")
+        assert "McNemar p" in out
+        assert "corrected" not in out
 
     def test_the_first_one_is_what_the_others_are_compared_with(self, capsys, files):
         _, out, _ = evaluate(capsys, "--compare", files[1], "baseline", *FLAGS, "--episodes", "2")

@@ -11,6 +11,8 @@ from scipy.stats import binom, multinomial
 from icub_jump_env.evaluation.statistics.difference import (
     Difference,
     bootstrap_interval,
+    holm_corrected,
+    in_words,
     paired_interval,
 )
 
@@ -88,6 +90,39 @@ class TestDifference:
     def test_of_a_single_pair_there_is_nothing_but_its_values(self):
         line = str(Difference.of(self.ours[:1], self.theirs[:1]))
         assert line == ("success +100.0 points, rise +0.30 cm, soles +0.00 cm (a single episode)")
+
+
+class TestHolm:
+    def differences(self, *p_values):
+        found = Difference.of(TestDifference.ours, TestDifference.theirs)
+        return [dataclasses.replace(found, p_value=p) for p in p_values]
+
+    @pytest.mark.parametrize(
+        ("p_values", "corrected"),
+        [
+            ((0.01, 0.04, 0.03, 0.005), (0.03, 0.06, 0.06, 0.02)),  # Wikipedia's example
+            ((0.02, 0.01, 0.02), (0.04, 0.03, 0.04)),
+            ((0.9, 0.4), (0.9, 0.8)),
+            ((0.8, 0.7), (1.0, 1.0)),
+        ],
+    )
+    def test_by_hand(self, p_values, corrected):
+        found = holm_corrected(self.differences(*p_values))
+        assert [d.p_value for d in found] == list(p_values)
+        assert [d.corrected_p_value for d in found] == pytest.approx(corrected)
+
+    def test_in_words(self):
+        few, none = holm_corrected(self.differences(0.0001, 0.5))
+        lines = in_words({"a against b": few, "a against c": none})
+        assert "McNemar p < 0.001, corrected p < 0.001), rise" in lines[0]
+        assert lines[1].startswith("a against c: success ")
+        assert "McNemar p = 0.500, corrected p = 0.500), rise" in lines[1]
+        assert lines[2:] == ["corrected p: Holm-corrected over 2 comparisons"]
+
+    def test_one_alone_stays_as_it_is(self):
+        (alone,) = holm_corrected(self.differences(0.03))
+        assert alone.corrected_p_value is None
+        assert len(in_words({"a against b": alone})) == 1
 
 
 class TestPairedInterval:

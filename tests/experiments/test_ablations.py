@@ -67,10 +67,10 @@ def test_each_kind_has_a_row_with_what_its_policies_do(runs, capsys):
         for line in out.splitlines()
         if "velocity" in line
     }
-    assert list(rows) == ["velocity, baseline", "velocity", "velocity-still"]
+    assert list(rows) == ["velocity, baseline", "velocity", "velocity-still (single seed)"]
     seeds, _, nothing, *_, minutes = rows["velocity, baseline"]
     assert (seeds, nothing, minutes) == ("-", "-", "-")
-    seeds, _, won, rise, _, sole, higher, minutes = rows["velocity-still"]
+    seeds, _, won, rise, _, sole, higher, minutes = rows["velocity-still (single seed)"]
     assert (seeds, won, higher, minutes) == (
         "1", "+0.0 (+0.0 to +0.0)", "+0.00 (+0.00 to +0.00)", "7",
     )  # fmt: skip

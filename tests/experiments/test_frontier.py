@@ -9,7 +9,7 @@ import pytest
 
 from agents.options import TASK
 from experiments import frontier, shipped
-from experiments.frontier import FrontierOptions, Point, judged, run_frontier, strongest
+from experiments.frontier import FrontierOptions, Point, judged, rivals, run_frontier
 from experiments.rivals import constant_shift
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.contender import BASELINE
@@ -27,23 +27,27 @@ def point(success, rise, command=0.06):
 POLICY = point(0.95, 0.051)
 
 
-class TestStrongest:
-    def test_the_highest_as_successful_and_the_most_successful_as_high(self):
-        sure, surer = point(0.94, 0.047), point(1.0, 0.045)  # 0.94 is not told from 0.95 here
-        high, higher = point(0.8, 0.0501), point(0.7, 0.055)  # nor 5.01 cm from 5.1
-        assert strongest([surer, higher, high, sure], POLICY) == {
-            "as successful a baseline": sure, "as high a baseline": high,
+class TestRivals:
+    def test_each_rule_chooses_with_and_without_its_slack(self):
+        sure, surer = point(0.94, 0.047), point(1.0, 0.045)  # 1 point below the policy
+        high, higher = point(0.8, 0.0501), point(0.7, 0.055)  # 0.9 mm below the policy
+        assert rivals([surer, higher, high, sure], POLICY) == {
+            "matched on success": surer, "matched on success within 2 points": sure,
+            "matched on rise": higher, "matched on rise within 1 mm": high,
         }  # fmt: skip
 
-    def test_one_may_be_both(self):
+    def test_of_those_that_are_matched_the_best_in_the_other_measure(self):
         better, worse = point(0.97, 0.052), point(0.96, 0.0515)
-        assert list(strongest([worse, better], POLICY).values()) == [better, better]
+        assert list(rivals([worse, better], POLICY).values()) == [better] * 4
 
-    def test_where_none_comes_near(self):
+    def test_where_none_is_matched(self):
         low, lower, bad = point(0.9, 0.049), point(0.9, 0.048), point(0.5, 0.0495)
-        assert strongest([lower, low, bad], POLICY) == {
-            "most successful baseline": low, "highest baseline": bad,
-        }  # fmt: skip
+        assert rivals([lower, low, bad], POLICY) == {
+            "most successful, as none is matched on success": low,
+            "most successful, as none is matched on success within 2 points": low,
+            "highest, as none is matched on rise": bad,
+            "highest, as none is matched on rise within 1 mm": bad,
+        }
 
 
 @pytest.fixture
@@ -73,12 +77,21 @@ def test_the_command_prints_the_grid_and_the_meeting(small, capsys):
     cells = ("baseline", "10"), ("velocity-constant", "9"), ("velocity", "9")
     assert rows == [(command, *cell) for command in "46" for cell in cells]
     assert re.search("^ ?seeds 0 to 1; success: landed after at least 4.2 cm", out, re.MULTILINE)
-    assert "\nseeds 3000 to 3002\npolicy, 6 cm after 9 cm: success " in out
-    assert len(re.findall(r"baseline, [46] cm after 10 cm: success .* of 3; .*, rise", out)) == 2
+    assert "\nheld-out seeds 3000 to 3002\npolicy, 6 cm after 9 cm: success " in out
     assert "\nconstant shift, 6 cm after 9 cm: success " in out
-    for who, times in ("policy", 3), ("constant shift", 2):
-        pattern = f"^  {who} against it: success .* McNemar .*, rise"
-        assert len(re.findall(pattern, out, re.MULTILINE)) == times
+    met = re.findall(r"^(baseline, [46] cm after 10 cm) \((.*)\): success .* of 3; ", out, re.M)
+    rules = [rule for _, names in met for rule in names.split("; ")]
+    assert len(rules) == 4
+    assert [re.search("on (success|rise)(.*)", rule).groups() for rule in rules] == [
+        ("success", ""), ("success", " within 2 points"), ("rise", ""), ("rise", " within 1 mm"),
+    ]  # fmt: skip
+    pairs = re.findall(r"^(.*) against (.*): success .* corrected p .* rise", out, re.M)
+    rivals_met = [name for name, _ in met]
+    assert pairs == [
+        ("policy", "constant shift"),
+        *((who, name) for name in rivals_met for who in ("policy", "constant shift")),
+    ]
+    assert f"\ncorrected p: Holm-corrected over {len(pairs)} comparisons\n" in out
     assert Path("pictures/frontier.png").read_bytes().startswith(b"\x89PNG")
 
 

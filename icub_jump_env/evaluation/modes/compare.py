@@ -16,7 +16,11 @@ from icub_jump_env.evaluation.episodes.series import Series, warn_if_alike, worl
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.quantities import PERCENT, commands, number, seeds
 from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
-from icub_jump_env.evaluation.statistics.difference import Difference
+from icub_jump_env.evaluation.statistics.difference import (
+    Difference,
+    holm_corrected,
+    in_words,
+)
 from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_labels
 
 if TYPE_CHECKING:
@@ -24,6 +28,9 @@ if TYPE_CHECKING:
 
 Arms = Mapping[str, Sequence[Episode]]
 """Episodes by the name of their contender."""
+
+Differences = Mapping[tuple[str, str], Difference]
+"""What one contender gains over another one, by their names."""
 
 
 def run(
@@ -37,7 +44,8 @@ def run(
         raise ConfigError("episodes", None, f"a number: each draws its command of {drawn}")
     warn_if_alike(config, progress)
     arms = run_contenders(options, contenders, progress)
-    found = report(arms, contenders) | {"episodes": len(options.seeds)}
+    differences = _differences(arms, contenders)
+    found = report(arms, contenders, differences) | {"episodes": len(options.seeds)}
 
     def figure() -> Figure:
         from icub_jump_env.evaluation.figures.compare import compare_figure
@@ -55,15 +63,17 @@ def run(
         failures = Summary.of(episodes).failures.items()
         counts = ", ".join(f"{len(failed)} {kind}" for kind, failed in failures)
         say(console, f"{name} failed: {counts or 'never'}")
-    for ours, theirs in _pairs(contenders):
-        difference = Difference.of(arms[ours], arms[theirs])
-        say(console, f"{ours} against {theirs}: {difference}")
+    named = {f"{ours} against {theirs}": found for (ours, theirs), found in differences.items()}
+    for line in in_words(named):
+        say(console, line)
 
 
-def _pairs(contenders: Sequence[Contender]) -> list[tuple[str, str]]:
-    """Names: all against the first, and the last against those between."""
+def _differences(arms: Arms, contenders: Sequence[Contender]) -> Differences:
+    """All against the first, and the last against those between, corrected for their number."""
     first, *others = (contender.name for contender in contenders)
-    return [(name, first) for name in others] + [(others[-1], name) for name in others[:-1]]
+    pairs = [(name, first) for name in others] + [(others[-1], name) for name in others[:-1]]
+    found = holm_corrected([Difference.of(arms[ours], arms[theirs]) for ours, theirs in pairs])
+    return dict(zip(pairs, found, strict=True))
 
 
 def run_contenders(
@@ -79,7 +89,9 @@ def run_contenders(
     return arms
 
 
-def report(arms: Arms, contenders: Sequence[Contender]) -> dict[str, Any]:
+def report(
+    arms: Arms, contenders: Sequence[Contender], differences: Differences
+) -> dict[str, Any]:
     """Everything that was found, for ``--json``."""
     return {
         "contenders": {
@@ -97,10 +109,10 @@ def report(arms: Arms, contenders: Sequence[Contender]) -> dict[str, Any]:
             {
                 "ours": ours,
                 "theirs": theirs,
-                "all": vars(Difference.of(arms[ours], arms[theirs])),
+                "all": vars(difference),
                 "by_command": _differences_by_command(arms[ours], arms[theirs]),
             }
-            for ours, theirs in _pairs(contenders)
+            for (ours, theirs), difference in differences.items()
         ],
     }
 

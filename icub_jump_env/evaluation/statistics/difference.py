@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,8 @@ class Difference:
         rise_interval: Its bootstrap interval.
         sole_height: Gain in the mean height of the soles (m).
         sole_height_interval: Its bootstrap interval.
+        corrected_p_value: The p-value, corrected for the other comparisons made with this one;
+            None if there are none, see :func:`holm_corrected`.
     """
 
     pairs: int
@@ -46,6 +49,7 @@ class Difference:
     rise_interval: Interval
     sole_height: float
     sole_height_interval: Interval
+    corrected_p_value: float | None = None
 
     @classmethod
     def of(cls, ours: Sequence[Episode], theirs: Sequence[Episode]) -> Difference:
@@ -83,13 +87,51 @@ class Difference:
         if self.pairs == 1:
             return f"success {points} points, rise {rise}, soles {soles} (a single episode)"
         low, high = (PERCENT * bound for bound in self.success_interval)
-        p = "p < 0.001" if self.p_value < 0.001 else f"p = {self.p_value:.3f}"
+        p = _shown(self.p_value)
+        if self.corrected_p_value is not None:
+            p += f", corrected {_shown(self.corrected_p_value)}"
         return (
             f"success {points} points (95 % interval {low:+.1f} to {high:+.1f}; "
             f"won {self.won}, lost {self.lost}, McNemar {p}), "
             f"rise {rise} ({spread(*self.rise_interval, 'cm', signed=True)}), "
             f"soles {soles} ({spread(*self.sole_height_interval, 'cm', signed=True)})"
         )
+
+
+def holm_corrected(differences: Sequence[Difference]) -> list[Difference]:
+    """The same differences, their p-values corrected for being several by Holm's method.
+
+    The smallest of n is multiplied by n, the next one by n - 1, and so on; none gets smaller
+    than the one before it. A single one needs no correction.
+    """
+    if len(differences) < 2:
+        return list(differences)
+    p_values = np.array([difference.p_value for difference in differences])
+    order = np.argsort(p_values)
+    factors = np.arange(len(p_values), 0, -1)
+    corrected = np.empty(len(p_values))
+    corrected[order] = np.minimum(np.maximum.accumulate(factors * p_values[order]), 1.0)
+    return [
+        dataclasses.replace(difference, corrected_p_value=float(p_value))
+        for difference, p_value in zip(differences, corrected, strict=True)
+    ]
+
+
+def in_words(differences: Mapping[str, Difference]) -> list[str]:
+    """A line for each difference, and what corrects their p-values.
+
+    Args:
+        differences: All that one command reports, corrected, by what is compared.
+    """
+    lines = [f"{names}: {difference}" for names, difference in differences.items()]
+    tested = [d for d in differences.values() if d.corrected_p_value is not None and d.pairs > 1]
+    if tested:
+        lines.append(f"corrected p: Holm-corrected over {len(tested)} comparisons")
+    return lines
+
+
+def _shown(p_value: float) -> str:
+    return "p < 0.001" if p_value < 0.001 else f"p = {p_value:.3f}"
 
 
 def _values(episodes: Sequence[Episode], metric: str) -> NDArray[np.float64]:
