@@ -17,7 +17,7 @@ from icub_jump_env.checks import (
     check_numbers,
     store,
 )
-from icub_jump_env.config import JumpConfig, Shortcuts
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.files import read_json
 from icub_jump_env.observation import SLICES, entry_scales
@@ -27,6 +27,7 @@ from icub_jump_env.policy.fields import (
     check_axes,
     check_hidden,
 )
+from icub_jump_env.shortcuts import Shortcuts
 
 Inputs = Literal["all", "command"]
 

@@ -7,6 +7,7 @@ fenced block that shows its output:
     (fenced block)
 
     python docs/update.py
+    python docs/update.py --only "--study robots"
 """
 
 from __future__ import annotations
@@ -54,9 +55,13 @@ def fresh(block: re.Match[str], output: Callable[[str], str] = output_of) -> str
 def main(arguments: Sequence[str] | None = None) -> None:
     """Update README.md and all documents, each block as soon as its command has run."""
     raw = argparse.RawDescriptionHelpFormatter
-    argparse.ArgumentParser(description=__doc__, formatter_class=raw).parse_args(arguments)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
+    parser.add_argument("--only", default="", help="run the commands that contain these words")
+    only = parser.parse_args(arguments).only
     for file in (REPOSITORY / "README.md", *sorted(DOCS.glob("*.md"))):
         for block in BLOCK.finditer(file.read_text()):
+            if only not in block["command"]:
+                continue
             print(f"{file.relative_to(REPOSITORY)}: {block['command']}")
             file.write_text(file.read_text().replace(block[0], fresh(block)))
 

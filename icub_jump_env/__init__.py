@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from icub_jump_env.config import JumpConfig, RenderConfig
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import (
     ContactConfig,
     PhaseConfig,
@@ -39,6 +39,7 @@ from icub_jump_env.simulation.actuators.torque_loops import (
     TorqueFeedback,
 )
 from icub_jump_env.simulation.randomization import Randomization
+from icub_jump_env.simulation.render_config import RenderConfig
 from icub_jump_env.simulation.sensor_models import SensorConfig, SensorError
 
 __version__ = "0.1.0"

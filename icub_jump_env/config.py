@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Any, Literal, Self, TypeVar, get_args, get_type_hints
+from typing import Any, Self, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
@@ -22,17 +21,14 @@ from icub_jump_env.checks import (
 )
 from icub_jump_env.control.config import (
     CONTROLLERS,
-    Constraints,
     ControllerConfig,
     ControllerName,
-    LaunchEnd,
-    SolverName,
     TorqueConfig,
     VelocityConfig,
 )
 from icub_jump_env.errors import ConfigError, UnknownFieldError
 from icub_jump_env.metrics.jump import SuccessConfig
-from icub_jump_env.planning.residual import ResidualConfig, ResidualPhases
+from icub_jump_env.planning.residual import ResidualConfig
 from icub_jump_env.planning.scaled_curve import (
     MAX_DISPLACEMENT,
     ComScaling,
@@ -41,12 +37,14 @@ from icub_jump_env.planning.scaled_curve import (
 from icub_jump_env.reward import RewardConfig
 from icub_jump_env.robot.robot import Robot, load_robot
 from icub_jump_env.robot.urdf import DEFAULT_MODEL
+from icub_jump_env.shortcuts import PATHS, path_to
 from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig, ActuatorName
 from icub_jump_env.simulation.randomization import (
     RANDOMIZATIONS,
     Randomization,
     RandomizationName,
 )
+from icub_jump_env.simulation.render_config import RenderConfig
 from icub_jump_env.simulation.sensor_models import (
     MAX_DELAY,
     SENSORS,
@@ -56,100 +54,11 @@ from icub_jump_env.simulation.sensor_models import (
 
 T = TypeVar("T")
 
-RenderMode = Literal["rgb_array", "human"]
-CameraName = Literal["side", "front", "profile"]
 
 JUMP_HEIGHT_RANGE = (0.01, 0.15)
 DISPLACEMENT_RANGE = (0.03, MAX_DISPLACEMENT)
 TIMESTEP_RANGE = (1e-5, 2e-3)
 AGENT_FREQUENCY_RANGE = (1.0, 1000.0)
-
-
-@dataclass(frozen=True)
-class RenderConfig:
-    """Pictures.
-
-    Attributes:
-        mode: None, rgb_array or human.
-        width: Of a picture (pixels).
-        height: Of a picture (pixels).
-        camera: Where they are taken from.
-
-    Raises:
-        ConfigError: If a value is out of range.
-    """
-
-    mode: RenderMode | None = None
-    width: int = 640
-    height: int = 480
-    camera: CameraName = "side"
-
-    def __post_init__(self) -> None:
-        check_choice("render_mode", self.mode, (None, *get_args(RenderMode)))
-        store(self, width=check_count("width", self.width, 16, 1920, "pixels"))
-        store(self, height=check_count("height", self.height, 16, 1080, "pixels"))
-        check_choice("camera", self.camera, get_args(CameraName))
-
-
-@dataclass(frozen=True)
-class Shortcuts:
-    """Fields inside the groups that ``gymnasium.make`` and ``eval.py`` take by themselves.
-
-    Attributes:
-        solver: QP solver.
-        constraints: Whether the CoM task and the momentum constraint are constraints, as
-            printed in the paper, or heavily weighted costs.
-        momentum_control: Pose the constraint on the angular momentum (eq. 3d, 6d).
-        control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
-            default 200 for the velocity controller and 500 for the torque controller.
-        launch_end: Whether the launch ends at T or at lift-off alone.
-        residual_scale: Largest offset of the CoM reference that an action can ask for:
-            forward, lateral, vertical (m).
-        residual_phases: Whether the residual acts in the launch alone or in all phases.
-        stand_time: How long the robot must stand after touch-down (s).
-        render_mode: None, rgb_array or human.
-        width: Of a picture (pixels).
-        height: Of a picture (pixels).
-        camera: Where pictures are taken from.
-    """
-
-    solver: SolverName | None = None
-    constraints: Constraints | None = None
-    momentum_control: bool | None = None
-    control_frequency: float | None = None
-    launch_end: LaunchEnd | None = None
-    residual_scale: tuple[float, float, float] | None = None
-    residual_phases: ResidualPhases | None = None
-    stand_time: float | None = None
-    render_mode: RenderMode | None = None
-    width: int | None = None
-    height: int | None = None
-    camera: CameraName | None = None
-
-
-_PATHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "solver": ("controller", "solver"),
-        "constraints": ("controller", "constraints"),
-        "momentum_control": ("controller", "momentum_control"),
-        "control_frequency": ("controller", "frequency"),
-        "launch_end": ("controller", "phases", "launch_end"),
-        "residual_scale": ("residual", "scale"),
-        "residual_phases": ("residual", "phases"),
-        "stand_time": ("success", "stand_time"),
-        "render_mode": ("rendering", "mode"),
-        "width": ("rendering", "width"),
-        "height": ("rendering", "height"),
-        "camera": ("rendering", "camera"),
-    }
-)
-"""Where the field is that a shortcut stands for: a group of :class:`JumpConfig`, and the way
-into it."""
-
-
-def path_to(name: str) -> tuple[str, ...]:
-    """The way to a field or to what a shortcut stands for, from :class:`JumpConfig` on."""
-    return _PATHS.get(name, (name,))
 
 
 @dataclass(frozen=True)
@@ -359,8 +268,8 @@ class JumpConfig:
         """
         names = [field.name for field in dataclasses.fields(self)]
         for name, value in changes.items():
-            if name not in names and name not in _PATHS:
-                allowed = f"no such field; the fields are {', '.join([*names, *_PATHS])}"
+            if name not in names and name not in PATHS:
+                allowed = f"no such field; the fields are {', '.join([*names, *PATHS])}"
                 raise UnknownFieldError(name, value, allowed)
         fields = {name: value for name, value in changes.items() if name in names}
         made = dataclasses.replace(self, **fields)
@@ -370,7 +279,7 @@ class JumpConfig:
         return made
 
     def _with_shortcut(self, name: str, value: Any) -> Self:
-        first, *path = _PATHS[name]
+        first, *path = PATHS[name]
         group = self.controller_config if first == "controller" else getattr(self, first)
         try:
             group = _set(group, path, value)

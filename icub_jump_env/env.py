@@ -26,7 +26,7 @@ from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.statics import holding_torque
 from icub_jump_env.simulation.physics import Physics
-from icub_jump_env.simulation.rendering import Renderer, make_renderer
+from icub_jump_env.simulation.rendering import make_renderer
 from icub_jump_env.simulation.simulation import Simulation
 from icub_jump_env.snapshot import Snapshot
 
@@ -83,7 +83,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Arguments
     The fields of :class:`icub_jump_env.config.JumpConfig` and the
-    :class:`icub_jump_env.config.Shortcuts` for fields inside its groups. ``reset(options=
+    :class:`icub_jump_env.shortcuts.Shortcuts` for fields inside its groups. ``reset(options=
     {"jump_height": 0.05})`` overrides the command for one episode.
 
     ## Version history
@@ -100,7 +100,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Args:
             config: Fields of :class:`icub_jump_env.config.JumpConfig`, and
-                :class:`icub_jump_env.config.Shortcuts`.
+                :class:`icub_jump_env.shortcuts.Shortcuts`.
 
         Raises:
             UnknownFieldError: If there is no such field; a ``TypeError``.
@@ -137,7 +137,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._outcome = "not reset"
         self._report = IDLE
         self._observation = np.zeros(observation.SIZE, np.float32)
-        self._renderer = self._make_renderer()
+        self._renderer = make_renderer(self._simulation.physics, self.config.rendering)
 
     @property
     def model(self) -> Any:
@@ -275,19 +275,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.__dict__.update(state)
         # The believed state is made of views of the model, which a copy fills anew.
         self._state = self._estimator.estimate(self._simulation.sensors.readings)
-        self._renderer = self._make_renderer()
-
-    def _make_renderer(self) -> Renderer | None:
-        rendering = self.config.rendering
-        if rendering.mode is None:
-            return None
-        return make_renderer(
-            self._simulation.physics,
-            rendering.mode,
-            rendering.width,
-            rendering.height,
-            rendering.camera,
-        )
+        self._renderer = make_renderer(self._simulation.physics, self.config.rendering)
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
         simulation = self._simulation

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from icub_jump_env.config import JumpConfig, RenderConfig, Shortcuts
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import (
     CONTROLLERS,
     ContactConfig,
@@ -19,10 +19,12 @@ from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.metrics.jump import SuccessConfig
 from icub_jump_env.planning.residual import ResidualConfig
 from icub_jump_env.reward import RewardConfig
+from icub_jump_env.shortcuts import Shortcuts
 from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 from icub_jump_env.simulation.actuators.torque_loops import CurrentControl
 from icub_jump_env.simulation.randomization import RANDOMIZATIONS, Randomization
+from icub_jump_env.simulation.render_config import RenderConfig
 from icub_jump_env.simulation.sensor_models import SENSORS, SensorConfig, SensorError
 
 
@@ -106,7 +108,7 @@ ALL_DIFFERENT = JumpConfig(
         phases=PhaseConfig(launch_end="lift_off", lift_off=5.0, touch_down=20.0, lift_off_ticks=3),
         com_stiffness=150.0,
         posture_weight=tuple(np.linspace(0.1, 2.0, 23)),
-        continuity_weight=(1e-3, 2e-3, 3e-3),
+        smoothness_weight=(1e-3, 2e-3, 3e-3),
         contact=ContactConfig(friction=0.4),
     ),
     jump_height=(0.03, 0.05),

@@ -112,14 +112,14 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("given", "named", "words"),
         [
-            *(({"residual_scale": scale}, "residual.scale", repr(scale)) for scale in (
+            *(({"residual_scale": scale}, "residual_scale", shown(scale)) for scale in (
                 0.1, (0.1, 0.1), (0.1, 0.1, -0.1), (0.1, 0.1, math.nan), "abc", {0.01, 0.02, 0.03},
             )),
-            ({"control_frequency": 0.0}, "frequency", "0.0"),
-            ({"control_frequency": 150.0}, "timestep", "1/150 s"),
-            ({"control_frequency": 3000.0}, "timestep", "1/3000 s"),
-            ({"residual_phases": "flight"}, "residual.phases", "'flight'"),
-            ({"residual": {"bandwidth": 0.0}}, "residual.bandwidth", "0.0"),
+            ({"control_frequency": 0.0}, "control_frequency", "0.0"),
+            ({"control_frequency": 150.0}, "control_frequency", "1000 Hz"),
+            ({"control_frequency": 3000.0}, "control_frequency", "1000 Hz"),
+            ({"residual_phases": "flight"}, "residual_phases", "'flight'"),
+            ({"residual": {"bandwidth": 0.0}}, "bandwidth", "0.0"),
             ({"residual": {"gain": 1.0}}, "gain", "no such field; the fields of residual are"),
             ({"reward": {"height": -1.0}}, "height", "-1.0"),
             ({"reward": {"hight": 1.0}}, "hight", "rotation"),
@@ -127,7 +127,9 @@ class TestBadInput:
             ({"rendering": {"width": 1e9}}, "width", "16 to 1920"),
         ],
     )  # fmt: skip
-    def test_values_inside_groups_are_refused_by_the_name_in_the_group(self, given, named, words):
+    def test_values_inside_groups_are_refused_by_the_name_they_were_given(
+        self, given, named, words
+    ):
         with pytest.raises(ConfigError) as refusal:
             ICubJumpEnv(**given)
         assert refusal.value.field == named

@@ -64,7 +64,7 @@ def clean(message):
 def test_any_value_gives_one_printable_line(value):
     for field in ("solver", "jump_height", "residual_scale", "sensors", "momentum_control"):
         with pytest.raises(ConfigError) as refusal:
-            JumpConfig(**{field: value})
+            JumpConfig.of(**{field: value})
         message = str(refusal.value)
         assert clean(message)
         assert message.startswith(f"{field}=")
@@ -77,7 +77,7 @@ def test_unknown_fields_with_any_name():
         with pytest.raises(ConfigError) as refusal:
             JumpConfig.of(**{name: 3})
         assert clean(str(refusal.value))
-        assert "=3 is not allowed: no such field; the fields are controller" in str(refusal.value)
+        assert "=3 is not allowed: no such field; the fields are robot" in str(refusal.value)
 
 
 def test_short_values_are_shown_whole():

@@ -19,6 +19,7 @@ LAYERS = (
     ("env",),
     ("policy",),
     ("config", "observation", "snapshot"),
+    ("shortcuts",),
     ("reward", "simulation"),
     ("control",),
     ("estimation", "planning", "metrics"),

@@ -182,7 +182,7 @@ class TorqueConfig(ControllerConfig):
         momentum: K of the momentum constraint (1/s).
         posture_weight: Diagonal of Lambda ((rad/s^2)^-2): of legs, torso and arms, or per
             joint.
-        continuity_weight: Diagonal of Delta (Nm^-2), likewise.
+        smoothness_weight: Diagonal of Delta (Nm^-2), likewise.
         com_weight: Weight of the CoM task's residual ((m/s^2)^-2), if soft.
         momentum_weight: Weight of the momentum residual (Nm^-2), if soft.
         wrench_weight: Weight of the contact wrenches (N^-2, (Nm)^-2); makes their
@@ -204,7 +204,7 @@ class TorqueConfig(ControllerConfig):
     com_damping: float = 28.0
     momentum: float = 10.0
     posture_weight: Weights = (1.0, 1.0, 0.1)
-    continuity_weight: Weights = (1e-3, 1e-3, 1e-3)
+    smoothness_weight: Weights = (1e-3, 1e-3, 1e-3)
     com_weight: float = 1e4
     momentum_weight: float = 3e3
     wrench_weight: float = 1e-4
@@ -229,7 +229,7 @@ class TorqueConfig(ControllerConfig):
             speed_horizon=(1e-3, 1.0, "s"),
             limit_horizon=(1e-3, 1.0, "s"),
         )
-        _store_weights(self, posture_weight=(1e-6, 1e6), continuity_weight=(0.0, 1e6))
+        _store_weights(self, posture_weight=(1e-6, 1e6), smoothness_weight=(0.0, 1e6))
         check_type("contact", self.contact, ContactConfig)
 
 

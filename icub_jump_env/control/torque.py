@@ -8,7 +8,7 @@ the CoM task and the momentum constraint become rows on f alone.
 Dynamics, feet, limits, friction, unilateral force and CoP are hard. The CoM task (6b) and
 the momentum constraint (6d) enter the cost with large weights, unless the configuration has
 them hard, too; where they clash with a limit, the robot gives way in the order of the
-weights: first posture and continuity, then momentum and CoM; never a limit, a contact
+weights: first posture and smoothness, then momentum and CoM; never a limit, a contact
 constraint or the feet.
 """
 
@@ -27,7 +27,7 @@ from icub_jump_env.control.tasks.limits import AccelerationLimits, TorqueLimits
 from icub_jump_env.control.tasks.momentum import MomentumRate
 from icub_jump_env.control.tasks.motion import BaseMotion
 from icub_jump_env.control.tasks.posture import PostureAcceleration
-from icub_jump_env.control.tasks.smoothness import SmallWrenches, TorqueContinuity
+from icub_jump_env.control.tasks.smoothness import SmallWrenches, TorqueSmoothness
 from icub_jump_env.control.tasks.stack import TaskQP
 from icub_jump_env.control.tasks.task import Task
 from icub_jump_env.estimation.state import RobotState
@@ -67,7 +67,7 @@ class TorqueController:
         self._holding_torque = holding_torque
         self._previous = holding_torque.copy()
         self._posture_weight = robot.per_joint("posture_weight", config.posture_weight)
-        self._continuity_weight = robot.per_joint("continuity_weight", config.continuity_weight)
+        self._smoothness_weight = robot.per_joint("smoothness_weight", config.smoothness_weight)
         self.solution = np.zeros(robot.n_joints + 12)
         self.report = IDLE
         self.qp = self._make_qp(hard=config.constraints == "hard")
@@ -86,7 +86,7 @@ class TorqueController:
         ]
         if config.momentum_control:
             tasks.append(MomentumRate(dynamics, config.momentum, config.momentum_weight))
-        continuity = TorqueContinuity(dynamics, self._continuity_weight, self._previous)
+        smoothness = TorqueSmoothness(dynamics, self._smoothness_weight, self._previous)
         return TaskQP(
             n,
             costs=[
@@ -95,7 +95,7 @@ class TorqueController:
                 ),
                 SmallWrenches(config.wrench_weight, robot.n_joints),
             ],
-            soft=[continuity] if hard else [continuity, *tasks],
+            soft=[smoothness] if hard else [smoothness, *tasks],
             hard=[*standing, *tasks] if hard else standing,
             limits=[
                 AccelerationLimits(robot, config.speed_horizon, config.limit_horizon),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Self, get_args
 
 from icub_jump_env.checks import check_choice, check_count, check_number, check_seed, store
-from icub_jump_env.config import JumpConfig, path_to
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy.fields import (
@@ -26,6 +26,7 @@ from icub_jump_env.policy.fields import (
     check_versions,
 )
 from icub_jump_env.robot.urdf import DEFAULT_MODEL
+from icub_jump_env.shortcuts import path_to
 
 FORMAT = 1
 """Format of the files that this version reads and writes."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from icub_jump_env.robot.mujoco_model import CAMERA
 from icub_jump_env.simulation.opengl import open_context
 from icub_jump_env.simulation.physics import Physics
+from icub_jump_env.simulation.render_config import RenderConfig
 from icub_jump_env.simulation.viewers.window import WindowScreen
 
 MAX_GEOMS = 1000
@@ -29,22 +30,17 @@ class Renderer(Protocol):
         ...
 
 
-def make_renderer(physics: Physics, mode: str, width: int, height: int, camera: str) -> Renderer:
-    """A renderer for ``rgb_array`` or ``human``.
-
-    Args:
-        physics: What it shows.
-        mode: ``rgb_array`` or ``human``.
-        width: Of a picture (pixels).
-        height: Of a picture (pixels).
-        camera: Name of the camera of a picture.
+def make_renderer(physics: Physics, config: RenderConfig) -> Renderer | None:
+    """A renderer, if pictures are asked for.
 
     Raises:
         MissingDependencyError: If there is no OpenGL, or no display for a window.
     """
-    if mode == "human":
+    if config.mode is None:
+        return None
+    if config.mode == "human":
         return WindowRenderer(physics)
-    return PictureRenderer(physics, width, height, camera)
+    return PictureRenderer(physics, config.width, config.height, config.camera)
 
 
 class PictureRenderer:

@@ -6,12 +6,13 @@ import pytest
 from tiny_run import UNUSUAL
 
 from agents.options import TASK, PPOOptions, TrainOptions, read_options
-from icub_jump_env.config import JumpConfig, Shortcuts
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import TorqueConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.report.output import write_json
 from icub_jump_env.observation import entry_scales
 from icub_jump_env.planning.residual import ResidualConfig
+from icub_jump_env.shortcuts import Shortcuts
 
 
 @pytest.mark.parametrize("options", [TrainOptions(), UNUSUAL], ids=["default", "unusual"])

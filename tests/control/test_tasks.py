@@ -20,7 +20,7 @@ from icub_jump_env.control.tasks.motion import BaseMotion
 from icub_jump_env.control.tasks.posture import PostureAcceleration, PostureVelocity
 from icub_jump_env.control.tasks.smoothness import (
     SmallWrenches,
-    TorqueContinuity,
+    TorqueSmoothness,
     VelocitySmoothness,
 )
 from icub_jump_env.control.tasks.stack import TaskQP
@@ -126,7 +126,7 @@ EQUATIONS = {
         lambda c, s_ddot, f: c.oracle.forces(s_ddot, f)[:6],
     ),
     "second term of (6a)": Equation(
-        lambda c: TorqueContinuity(c.dynamics, c.weights, c.previous),
+        lambda c: TorqueSmoothness(c.dynamics, c.weights, c.previous),
         lambda c, s_ddot, f: np.sqrt(c.weights) * (c.oracle.forces(s_ddot, f)[6:] - c.previous),
     ),
 }

@@ -101,7 +101,7 @@ def textbook(case, previous):
     for rows, target, weight in (
         *((r, t, np.full(3, w)) for r, t, w in tasks if not hard),
         (A_nu[6:], posture - a_nu[6:], ROBOT.per_joint("", config.posture_weight)),
-        (np.eye(N, N + 12), previous, ROBOT.per_joint("", config.continuity_weight)),
+        (np.eye(N, N + 12), previous, ROBOT.per_joint("", config.smoothness_weight)),
         (np.eye(N + 12)[N:], np.zeros(12), np.full(12, config.wrench_weight)),
     ):
         H += rows.T @ (weight[:, None] * rows)
@@ -152,7 +152,7 @@ def test_equals_the_textbook_form_at_any_weights_gains_and_set_points(seed, cons
         com_weight=10 ** draw(0.0, 4.0),
         momentum_weight=10 ** draw(-1.0, 3.0),
         posture_weight=tuple(draw(0.1, 2.0, 3)),
-        continuity_weight=tuple(10 ** draw(-4.0, -2.0, N)),
+        smoothness_weight=tuple(10 ** draw(-4.0, -2.0, N)),
         wrench_weight=10 ** draw(-4.0, -2.0),
         posture_stiffness=draw(1.0, 20.0),
         posture_damping=draw(1.0, 10.0),
@@ -255,7 +255,7 @@ def test_reset_forgets():
         ("posture_weight", (0.0,) * 3),
         ("momentum", "x"),
         ("contact", {}),
-        ("continuity_weight", 1e-3),
+        ("smoothness_weight", 1e-3),
         ("kind", "velocity"),
         ("speed_horizon", 0.0),
     ],
@@ -306,7 +306,7 @@ class TestHardConstraints:
 
 
 def test_a_wrong_number_of_weights_is_refused():
-    for field in ("posture_weight", "continuity_weight"):
+    for field in ("posture_weight", "smoothness_weight"):
         with pytest.raises(ConfigError, match=r"3 weights .* or 23") as refusal:
             Case(0, **{field: (1.0,) * 22})
         assert refusal.value.field == field

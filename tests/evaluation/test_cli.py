@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from contenders import evaluate, save_constant
 
-from icub_jump_env.config import JumpConfig, Shortcuts
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ContactConfig, TorqueConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation import cli
@@ -22,6 +22,7 @@ from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.report.output import write_json
 from icub_jump_env.metrics.jump import SuccessConfig
 from icub_jump_env.planning.residual import ResidualConfig
+from icub_jump_env.shortcuts import Shortcuts
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from policies import DETAILS, POLICIES
 
 from icub_jump_env import observation
-from icub_jump_env.config import JumpConfig, Shortcuts, path_to
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import PolicyCard, check_match
 from icub_jump_env.policy.card import TASK_FIELDS, mismatches
+from icub_jump_env.shortcuts import Shortcuts, path_to
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
 from icub_jump_env.simulation.actuators.servo import ServoGains

@@ -30,7 +30,7 @@ class VelocitySmoothness:
         gradient -= self.diagonal * self._previous
 
 
-class TorqueContinuity:
+class TorqueSmoothness:
     """1/2 ||tau - tau_{k-1}||^2_Delta, eq. (6a); tau is affine in the unknowns.
 
     The paper's text speaks of the difference of accelerations; we take the formula.

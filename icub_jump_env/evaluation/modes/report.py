@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
-from icub_jump_env.config import JumpConfig, RenderConfig
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.figures.paper import (
     base_pitch_figure,
@@ -32,6 +32,7 @@ from icub_jump_env.evaluation.report.page import Picture, data_uri, drawing, pho
 from icub_jump_env.evaluation.report.provenance import command, versions
 from icub_jump_env.evaluation.statistics.paper import MOMENTUM_EQUATION, comparison_rows, verdict
 from icub_jump_env.files import write_file
+from icub_jump_env.simulation.render_config import RenderConfig
 
 PAGE = "index.html"
 

@@ -1,0 +1,72 @@
+"""Fields inside the groups of the configuration that can be given by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from icub_jump_env.control.config import Constraints, LaunchEnd, SolverName
+from icub_jump_env.planning.residual import ResidualPhases
+from icub_jump_env.simulation.render_config import CameraName, RenderMode
+
+
+@dataclass(frozen=True)
+class Shortcuts:
+    """Fields inside the groups that ``gymnasium.make`` and ``eval.py`` take by themselves.
+
+    Attributes:
+        solver: QP solver.
+        constraints: Whether the CoM task and the momentum constraint are constraints, as
+            printed in the paper, or heavily weighted costs.
+        momentum_control: Pose the constraint on the angular momentum (eq. 3d, 6d).
+        control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
+            default 200 for the velocity controller and 500 for the torque controller.
+        launch_end: Whether the launch ends at T or at lift-off alone.
+        residual_scale: Largest offset of the CoM reference that an action can ask for:
+            forward, lateral, vertical (m).
+        residual_phases: Whether the residual acts in the launch alone or in all phases.
+        stand_time: How long the robot must stand after touch-down (s).
+        render_mode: None, rgb_array or human.
+        width: Of a picture (pixels).
+        height: Of a picture (pixels).
+        camera: Where pictures are taken from.
+    """
+
+    solver: SolverName | None = None
+    constraints: Constraints | None = None
+    momentum_control: bool | None = None
+    control_frequency: float | None = None
+    launch_end: LaunchEnd | None = None
+    residual_scale: tuple[float, float, float] | None = None
+    residual_phases: ResidualPhases | None = None
+    stand_time: float | None = None
+    render_mode: RenderMode | None = None
+    width: int | None = None
+    height: int | None = None
+    camera: CameraName | None = None
+
+
+PATHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "solver": ("controller", "solver"),
+        "constraints": ("controller", "constraints"),
+        "momentum_control": ("controller", "momentum_control"),
+        "control_frequency": ("controller", "frequency"),
+        "launch_end": ("controller", "phases", "launch_end"),
+        "residual_scale": ("residual", "scale"),
+        "residual_phases": ("residual", "phases"),
+        "stand_time": ("success", "stand_time"),
+        "render_mode": ("rendering", "mode"),
+        "width": ("rendering", "width"),
+        "height": ("rendering", "height"),
+        "camera": ("rendering", "camera"),
+    }
+)
+"""Where the field is that a shortcut stands for: a group of :class:`JumpConfig`, and the way
+into it."""
+
+
+def path_to(name: str) -> tuple[str, ...]:
+    """The way to a field or to what a shortcut stands for, from :class:`JumpConfig` on."""
+    return PATHS.get(name, (name,))
