@@ -135,10 +135,13 @@ def test_wheel_ships_the_package_alone(wheel):
 def test_wheel_ships_the_agents_the_policies_and_the_command(wheel):
     content = zipfile.ZipFile(wheel)
     names = set(content.namelist())
-    agents = {f"icub_jump_env/agents/{file.name}" for file in AGENTS}
-    assert agents == {
-        name for name in names if name.startswith("icub_jump_env/agents/") and name.endswith(".py")
+    folder = REPOSITORY / "agents"
+    agents = {
+        f"icub_jump_env/agents/{file.relative_to(folder)}"
+        for file in folder.rglob("*")
+        if file.suffix in (".py", ".yml")
     }
+    assert agents == {name for name in names if name.startswith("icub_jump_env/agents/")}
     folder = "icub_jump_env/policy/shipped"
     assert {name for name in names if name.startswith(folder)} == {
         f"{folder}/{policy}.{suffix}"
