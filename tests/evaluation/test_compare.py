@@ -113,7 +113,7 @@ class TestFigure:
 
     def test_names_are_shown_as_they_are(self, tmp_path):
         names = ["cost$1$", r"\$2", "_hidden", "a_b^c"]
-        figure = compare_figure(dict.fromkeys(names, ARMS["first"]))
+        figure = compare_figure(dict.fromkeys(names, ARMS["first"]), SuccessConfig())
         left, right = (axes.get_legend().get_texts() for axes in figure.axes)
         assert [text.get_text() for text in left] == names
         assert [text.get_text() for text in right][:4] == [f"{name}, fallen" for name in names]

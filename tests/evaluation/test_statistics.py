@@ -288,7 +288,7 @@ class TestCommand:
         expected = [f"landed and stands: {words}", f"success: {words}"]
         if not landed:
             expected += ["failure: slipped"]
-        assert lines.splitlines()[: len(expected)] == expected
+        assert lines[: len(expected)] == expected
 
 
 class TestRangeOfCommands:
