@@ -148,7 +148,7 @@ def _run(*words: str) -> None:
 
 
 def _ship(controller: ControllerName, jobs: int, console: Console) -> LoadedPolicy:
-    """The best of the headline runs; its card says how it does where nothing was chosen."""
+    """The best of the headline runs; its card says how it does on held-out seeds."""
     names = [f"{controller}-seed{seed}.safetensors" for seed in HEADLINE_SEEDS]
     contenders = read_contenders([str(RUNS / name) for name in names])
     best = max(contenders, key=lambda contender: _selection(contender)["score"])

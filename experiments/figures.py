@@ -38,7 +38,7 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
                 f"{CM * point.jump_height:g}/{CM * point.displacement:g}",
                 (share, rise),
                 textcoords="offset points",
-                xytext=(4, 3),
+                xytext=(6, 4),
                 fontsize=7,
                 color=color,
             )
