@@ -70,19 +70,25 @@ class ResidualFilter:
         self.offset = np.zeros(3)
         self.velocity = np.zeros(3)
         self.acceleration = np.zeros(3)
+        self._at_rest = True
 
     def reset(self) -> None:
         """Return to rest at zero."""
+        self._at_rest = True
         self.offset[:] = 0.0
         self.velocity[:] = 0.0
         self.acceleration[:] = 0.0
 
     def step(self, target: Array, dt: float) -> None:
         """Advance by ``dt`` seconds towards ``target`` ((3,) m)."""
+        goals = target.tolist()
+        if self._at_rest and not any(goals):
+            return
+        self._at_rest = False
         w = self._bandwidth
         decay = math.exp(-w * dt)
         # Three numbers at each control tick: floats take a third of the time of arrays.
-        now = zip(target.tolist(), self.offset.tolist(), self.velocity.tolist(), strict=True)
+        now = zip(goals, self.offset.tolist(), self.velocity.tolist(), strict=True)
         for axis, (goal, offset, velocity) in enumerate(now):
             error = offset - goal
             slope = velocity + w * error
