@@ -25,6 +25,7 @@ class Shortcuts:
         launch_end: Whether the launch ends at T or at lift-off alone.
         residual_scale: Largest offset of the CoM reference that an action can ask for:
             forward, lateral, vertical (m).
+        residual_bandwidth: Natural frequency of the filter that shapes the residual (rad/s).
         residual_phases: Whether the residual acts in the launch alone or in all phases.
         stand_time: How long the robot must stand after touch-down (s).
         render_mode: None, rgb_array or human.
@@ -39,6 +40,7 @@ class Shortcuts:
     control_frequency: float | None = None
     launch_end: LaunchEnd | None = None
     residual_scale: tuple[float, float, float] | None = None
+    residual_bandwidth: float | None = None
     residual_phases: ResidualPhases | None = None
     stand_time: float | None = None
     render_mode: RenderMode | None = None
@@ -55,6 +57,7 @@ PATHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "control_frequency": ("controller", "frequency"),
         "launch_end": ("controller", "phases", "launch_end"),
         "residual_scale": ("residual", "scale"),
+        "residual_bandwidth": ("residual", "bandwidth"),
         "residual_phases": ("residual", "phases"),
         "stand_time": ("success", "stand_time"),
         "render_mode": ("rendering", "mode"),

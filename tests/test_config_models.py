@@ -174,6 +174,7 @@ class TestGroups:
                 {"controller": {"kind": "velocity", "phases": {"launch_end": "lift_off"}}},
             ),
             ("residual_scale", (0.01, 0.02, 0.03), {"residual": {"scale": [0.01, 0.02, 0.03]}}),
+            ("residual_bandwidth", 20.0, {"residual": ResidualConfig(bandwidth=20.0)}),
             ("residual_phases", "all", {"residual": ResidualConfig(phases="all")}),
             ("stand_time", 0.5, {"success": {"stand_time": 0.5}}),
             ("render_mode", "rgb_array", {"rendering": {"mode": "rgb_array"}}),

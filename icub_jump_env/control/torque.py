@@ -21,13 +21,13 @@ from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.config import TorqueConfig
 from icub_jump_env.control.qp.problem import IDLE
 from icub_jump_env.control.tasks.com import ComAcceleration
-from icub_jump_env.control.tasks.contact import ContactLimits
+from icub_jump_env.control.tasks.contact import ContactLimits, SmallWrenches
 from icub_jump_env.control.tasks.feet import FeetAcceleration
 from icub_jump_env.control.tasks.limits import AccelerationLimits, TorqueLimits
 from icub_jump_env.control.tasks.momentum import MomentumRate
 from icub_jump_env.control.tasks.motion import BaseMotion
 from icub_jump_env.control.tasks.posture import PostureAcceleration
-from icub_jump_env.control.tasks.smoothness import SmallWrenches, TorqueSmoothness
+from icub_jump_env.control.tasks.smoothness import TorqueSmoothness
 from icub_jump_env.control.tasks.stack import TaskQP
 from icub_jump_env.control.tasks.task import Task
 from icub_jump_env.estimation.state import RobotState

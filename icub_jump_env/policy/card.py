@@ -38,6 +38,7 @@ TASK_FIELDS = (
     "com_scaling",
     "momentum_control",
     "residual_scale",
+    "residual_bandwidth",
     "residual_phases",
     "control_frequency",
     "agent_frequency",
@@ -164,8 +165,10 @@ def check_match(card: PolicyCard, config: JumpConfig) -> None:
 def _check_config(config: Any) -> JumpConfig:
     if isinstance(config, JumpConfig):
         return config
-    # Before there was a choice, it was this robot.
-    explicit = {"robot": DEFAULT_MODEL, **check_mapping("config", config)}
+    given = check_mapping("config", config)
+    # What it was before there was a choice.
+    implied = {} if "residual" in given else {"residual_bandwidth": 15.0}
+    explicit = {"robot": DEFAULT_MODEL, **implied, **given}
     checked = JumpConfig.of(**explicit)
     for field in TASK_FIELDS:
         # Else the policy would change with the default.

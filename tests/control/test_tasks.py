@@ -12,17 +12,13 @@ from standing import GRAVITY, ROBOT, N, Oracle, Standing
 
 from icub_jump_env.control.config import ContactConfig
 from icub_jump_env.control.tasks.com import ComAcceleration, ComVelocity
-from icub_jump_env.control.tasks.contact import ContactLimits, contact_rows
+from icub_jump_env.control.tasks.contact import ContactLimits, SmallWrenches, contact_rows
 from icub_jump_env.control.tasks.feet import FeetAcceleration, FeetVelocity
 from icub_jump_env.control.tasks.limits import AccelerationLimits, TorqueLimits, VelocityLimits
 from icub_jump_env.control.tasks.momentum import MomentumIntegral, MomentumRate
 from icub_jump_env.control.tasks.motion import BaseMotion
 from icub_jump_env.control.tasks.posture import PostureAcceleration, PostureVelocity
-from icub_jump_env.control.tasks.smoothness import (
-    SmallWrenches,
-    TorqueSmoothness,
-    VelocitySmoothness,
-)
+from icub_jump_env.control.tasks.smoothness import TorqueSmoothness, VelocitySmoothness
 from icub_jump_env.control.tasks.stack import TaskQP
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 

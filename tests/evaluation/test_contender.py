@@ -131,6 +131,10 @@ class TestAsTrained:
         content = json.loads((tmp_path / "r.json").read_text())
         return JumpConfig.of(**content["config"])
 
+    def test_the_filter_of_the_residual_is_the_policys(self, capsys, tmp_path):
+        file = save(tmp_path / "quick.safetensors", FEEDBACK, residual_bandwidth=20.0)
+        assert self.config(capsys, tmp_path, "--policy", file).residual.bandwidth == 20.0
+
     def test_what_the_policy_depends_on_is_as_the_card_says_and_nothing_else(
         self, capsys, tmp_path, file
     ):

@@ -175,6 +175,7 @@ def test_any_json_is_taken_or_refused_cleanly(name, value):
 OTHERS = {
     "robot": "iCubGazeboV2_5",
     "residual_phases": "all",
+    "residual_bandwidth": 20.0,
     "controller": "torque",
     "com_displacement": 0.1,
     "com_scaling": "acceleration",
@@ -285,6 +286,7 @@ def test_a_card_without_groups_is_read_and_is_of_the_robot_there_was():
     assert not card.config.controller_config.momentum_control
     assert card.config.controller_config.solver == "osqp"
     assert card.config.robot == "iCubGenova04"
+    assert card.config.residual.bandwidth == 15.0
     check_match(card, JumpConfig.of(**FLAT))
     with pytest.raises(PolicyMismatchError, match="robot='iCubGazeboV2_5' instead of"):
         check_match(card, JumpConfig.of(**FLAT, robot="iCubGazeboV2_5"))

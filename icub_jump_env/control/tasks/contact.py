@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.control.config import ContactConfig
-from icub_jump_env.control.tasks.task import LimitBuffers
+from icub_jump_env.control.tasks.task import Limit, LimitBuffers
 from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.robot.icub import Sole
 from icub_jump_env.robot.robot import Robot
 
 
-class ContactLimits:
+class ContactLimits(Limit):
     """C u <= b for both feet, eq. (6f), with a least normal force."""
 
     size = 20
@@ -30,8 +31,19 @@ class ContactLimits:
         buffers.rows_upper[:] = 0.0
         buffers.lower[[-10, -4]] = self._minimum_force
 
-    def write(self, state: RobotState, buffers: LimitBuffers) -> None:
-        """Nothing changes."""
+
+class SmallWrenches:
+    """1/2 w ||f||^2: makes the distribution of the contact wrenches over the feet unique."""
+
+    def __init__(self, weight: float, n_joints: int) -> None:
+        """Set up the task; the unknowns are n joint accelerations, then 12 wrench entries."""
+        self.diagonal = np.zeros(n_joints + 12)
+        self.diagonal[n_joints:] = weight
+
+    def subtract(
+        self, state: RobotState, setpoint: Setpoint, gradient: NDArray[np.float64]
+    ) -> None:
+        """Nothing: the goal is zero."""
 
 
 def contact_rows(config: ContactConfig, sole: Sole) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.tasks.task import LimitBuffers
+from icub_jump_env.control.tasks.task import Limit, LimitBuffers
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.robot import Robot
@@ -13,13 +13,11 @@ from icub_jump_env.robot.robot import Robot
 Array = NDArray[np.float64]
 
 
-class VelocityLimits:
+class VelocityLimits(Limit):
     """s_dot^- <= s_dot <= s_dot^+ and s^- <= s + T s_dot <= s^+, eq. (3e).
 
     The paper takes one control period for the horizon T, in which no joint can stop.
     """
-
-    size = 0
 
     def __init__(self, robot: Robot, horizon: float, margin: float) -> None:
         """Set up the limit.
@@ -35,9 +33,6 @@ class VelocityLimits:
         self._lowest = robot.lower_position / horizon
         self._highest = robot.upper_position / horizon
 
-    def prepare(self, buffers: LimitBuffers) -> None:
-        """Nothing stays the same."""
-
     def write(self, state: RobotState, buffers: LimitBuffers) -> None:
         """Write the bounds of the joint velocities."""
         rate = state.joint_position / self._horizon
@@ -47,23 +42,18 @@ class VelocityLimits:
             np.maximum(bound, self._slowest, out=bound)
 
 
-class AccelerationLimits:
+class AccelerationLimits(Limit):
     """s_dot^- <= s_dot <= s_dot^+, s^- <= s <= s^+ after a horizon each, eq. (6e).
 
     At the decided s_ddot the speed after its horizon, and s + T s_dot + T^2/2 s_ddot, are
     within their limits; where both cannot be, the speed is.
     """
 
-    size = 0
-
     def __init__(self, robot: Robot, speed_horizon: float, position_horizon: float) -> None:
         """Set up the limit; horizons in s."""
         self._robot = robot
         self._speed_horizon, self._horizon = speed_horizon, position_horizon
         self._per_acceleration = 2.0 / position_horizon**2
-
-    def prepare(self, buffers: LimitBuffers) -> None:
-        """Nothing stays the same."""
 
     def write(self, state: RobotState, buffers: LimitBuffers) -> None:
         """Write the bounds of the joint accelerations."""
@@ -81,16 +71,13 @@ class AccelerationLimits:
             np.minimum(bound, fastest, out=bound)
 
 
-class TorqueLimits:
+class TorqueLimits(Limit):
     """tau^- <= tau <= tau^+, eq. (6e)."""
 
     def __init__(self, dynamics: FeetFixedDynamics, robot: Robot) -> None:
         self.size = robot.n_joints
         self._dynamics = dynamics
         self._highest, self._lowest = robot.effort_limit, -robot.effort_limit
-
-    def prepare(self, buffers: LimitBuffers) -> None:
-        """Nothing stays the same."""
 
     def write(self, state: RobotState, buffers: LimitBuffers) -> None:
         """Write tau(x) and its bounds."""

@@ -55,15 +55,3 @@ class TorqueSmoothness:
         np.multiply(self._root_column, self._dynamics.torque_rows, out=rows)
         np.subtract(self._previous, self._dynamics.torque_bias, out=target)
         target *= self._root
-
-
-class SmallWrenches:
-    """1/2 w ||f||^2: makes the distribution of the contact wrenches over the feet unique."""
-
-    def __init__(self, weight: float, n_joints: int) -> None:
-        """Set up the task; the unknowns are n joint accelerations, then 12 wrench entries."""
-        self.diagonal = np.zeros(n_joints + 12)
-        self.diagonal[n_joints:] = weight
-
-    def subtract(self, state: RobotState, setpoint: Setpoint, gradient: Array) -> None:
-        """Nothing: the goal is zero."""

@@ -58,19 +58,17 @@ class LimitBuffers(NamedTuple):
     rows_upper: Array
 
 
-class Limit(Protocol):
+class Limit:
     """Inequalities: bounds of the unknowns, and rows.
 
     Attributes:
         size: Number of its rows.
     """
 
-    size: int
+    size: int = 0
 
     def prepare(self, buffers: LimitBuffers) -> None:
         """Write what does not change; once."""
-        ...
 
     def write(self, state: RobotState, buffers: LimitBuffers) -> None:
         """Write what changes; once per control tick."""
-        ...
