@@ -18,10 +18,10 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from icub_jump_env.control.solvers import DAQPSolver
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
+from icub_jump_env.control.qp.solvers import DAQPSolver
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.metrics.jump import JumpRecorder
