@@ -130,7 +130,7 @@ def bench_episode(name: ControllerName, repetitions: int) -> None:
         episode = run_episode(env, seed)
         wall = time.perf_counter() - start
         flown = episode.jump["takeoff_time"] + episode.jump["flight_time"]
-        factors.append((flown + env.config.stand_time) / wall)
+        factors.append((flown + env.config.success.stand_time) / wall)
     env.close()
     print(
         f"nominal episode, {name} controller, 1 ms: {np.median(factors):.1f} x real time, "

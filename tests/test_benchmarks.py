@@ -16,4 +16,4 @@ def test_a_benchmark_shows_its_help(script):
     shown = subprocess.run(
         [sys.executable, script, "--help"], capture_output=True, text=True, check=True
     )
-    assert f"{script.parent.name}/{script.name}" in shown.stdout
+    assert shown.stdout.startswith(f"usage: {script.name}")
