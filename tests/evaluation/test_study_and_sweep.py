@@ -198,7 +198,7 @@ class TestAllStudies:
         study.run_cases(STUDIES["launch_end"], options, Console(quiet=True))
         assert {job.config.value_of("constraints") for job in asked} == {"hard"}
 
-    def test_a_robot_that_never_took_off_is_named(self):
+    def test_cases_without_a_real_flight_are_named(self):
         flew, stayed = episode(0), episode(1, Failure.NO_TAKEOFF)
         results = [
             CaseResult(
@@ -210,9 +210,10 @@ class TestAllStudies:
                 "other": {"velocity": [stayed, stayed], "torque": [episode(0, Failure.SLIPPED)]},
             }.items()
         ]
-        assert study.never_took_off(results) == [
-            "torque, one: no flight in 1 of 2", "velocity, other: no flight in 2 of 2",
-        ]  # fmt: skip
+        assert study.short_flights(results, 0.1) == [
+            "torque, one: no flight of 0.1 s in 1 of 2",
+            "velocity, other: no flight of 0.1 s in 2 of 2",
+        ]
 
 
 class TestSweep:

@@ -116,7 +116,7 @@ def run(options: EvalOptions, _: Sequence[Contender], console: Console, progress
         figures = {"realism.png": partial(realism_figure, results)}
     write_results(options, progress, found, figures)
     show(console, render(study, results, options))
-    for line in never_took_off(results):
+    for line in short_flights(results, options.config.success.flight_time):
         say(console, line)
     if figures and options.plot is None:
         say(progress, "for the picture add --plot FOLDER")
@@ -180,8 +180,8 @@ def render(study: Study, results: Sequence[CaseResult], options: EvalOptions) ->
     return table
 
 
-def never_took_off(results: Sequence[CaseResult]) -> list[str]:
-    """A line for each case in which a robot stayed on the ground."""
+def short_flights(results: Sequence[CaseResult], flight_time: float) -> list[str]:
+    """A line for each case with flights, if any, that were shorter than ``flight_time`` (s)."""
     lines = []
     for result in results:
         for controller, summary in result.summaries.items():
@@ -189,6 +189,7 @@ def never_took_off(results: Sequence[CaseResult]) -> list[str]:
             if stayed:
                 total = summary.landed.total
                 lines.append(
-                    f"{controller}, {result.case.label}: no flight in {stayed} of {total}"
+                    f"{controller}, {result.case.label}: "
+                    f"no flight of {flight_time:g} s in {stayed} of {total}"
                 )
     return lines
