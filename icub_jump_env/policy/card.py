@@ -48,8 +48,12 @@ TASK_FIELDS = (
 
 The others may differ from those of the training: a policy is meant for other commands,
 and to be tried on other actuators, sensors and worlds; solver and physics step decide how
-exactly the same is computed; rendering and ``stand_time`` do not reach it.
+exactly the same is computed; rendering and ``stand_time`` do not reach it. Of a controller of
+the same name, all but the solver must agree: gains, weights, limits, when phases end.
 """
+
+_CONTROLLER_FREE = ("solver", "frequency", "momentum_control")
+"""Fields of a controller that may differ, or are task fields by themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,6 +152,13 @@ def mismatches(card: PolicyCard, config: JumpConfig) -> list[tuple[str, Any, Any
     theirs, ours = dict(card.observation), entry_scales()
     pairs = [(f"observation.{name}", theirs.get(name), ours.get(name)) for name in theirs | ours]
     pairs += [(name, card.config.value_of(name), config.value_of(name)) for name in TASK_FIELDS]
+    trained, given = card.config.controller_config, config.controller_config
+    if type(trained) is type(given):
+        pairs += [
+            (f"controller.{field.name}", getattr(trained, field.name), getattr(given, field.name))
+            for field in dataclasses.fields(given)
+            if field.name not in _CONTROLLER_FREE
+        ]
     return [pair for pair in pairs if pair[1] != pair[2]]
 
 

@@ -13,6 +13,7 @@ from policies import DETAILS, POLICIES
 
 from icub_jump_env import observation
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import PhaseConfig, VelocityConfig
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import PolicyCard, check_match
@@ -231,15 +232,31 @@ def test_the_rest_of_the_configuration_may_differ():
     check_match(make_card(), JumpConfig.of(control_frequency=200))
 
 
+@pytest.mark.parametrize(
+    ("controller", "field"),
+    [
+        (VelocityConfig(com=5.0), "controller.com"),
+        (VelocityConfig(posture_weight=(1.0, 2.0, 3.0)), "controller.posture_weight"),
+        (VelocityConfig(constraints="hard"), "controller.constraints"),
+        (VelocityConfig(phases=PhaseConfig(launch_end="lift_off")), "controller.phases"),
+    ],
+)
+def test_the_controller_must_be_the_one_of_the_training(controller, field):
+    found = mismatches(make_card(), JumpConfig(controller=controller))
+    assert [name for name, _, _ in found] == [field]
+    check_match(make_card(), JumpConfig(controller=VelocityConfig(solver="osqp")))
+
+
 def test_the_fields_are_sorted_into_two_kinds_with_none_forgotten():
     """A new field of the configuration must be sorted, too."""
     free = {
-        "jump_height", "solver", "constraints", "launch_end", "timestep", "actuators", "sensors",
+        "jump_height", "solver", "timestep", "actuators", "sensors",
         "command_delay", "randomization", "reward", "success", "stand_time", "rendering",
         "render_mode", "width", "height", "camera", "residual",
     }  # fmt: skip
+    of_the_controller = {"constraints", "launch_end"}
     names = {f.name for kind in (JumpConfig, Shortcuts) for f in dataclasses.fields(kind)}
-    assert names == free | set(TASK_FIELDS)
+    assert names == free | of_the_controller | set(TASK_FIELDS)
 
 
 def test_the_layout_must_match_by_name():
