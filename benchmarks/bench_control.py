@@ -33,6 +33,7 @@ from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajec
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import load_robot
+from icub_jump_env.robot.statics import make_stance
 
 Sample = tuple[float, np.ndarray, np.ndarray]
 
@@ -78,14 +79,17 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
     _, s, s_dot = samples[0]
     reference = Reference(ResidualFilter(bandwidth=15.0))
     state = estimator.estimate(Readings(s, s_dot))
-    reference.start(ScaledCurvePlan(plan_com_trajectory(0.04), robot), state.com)
+    stance = make_stance(kinematics, robot.crouch)
+    plan = ScaledCurvePlan(plan_com_trajectory(0.04), robot, stance)
+    reference.start(plan, state.com)
     dynamics = FeetFixedDynamics(kinematics)
     config = dataclasses.replace(CONTROLLERS[name], solver=solver)
     controller: VelocityController | TorqueController
     if isinstance(config, TorqueConfig):
-        controller = TorqueController(config, kinematics, np.zeros(robot.n_joints))
+        controller = TorqueController(config, kinematics)
     else:
         controller = VelocityController(config, kinematics)
+    controller.reset(stance)
     qp = controller.qp
     problem = qp.problem
     alone = make_solver(solver, problem)

@@ -20,11 +20,11 @@ from icub_jump_env.estimation.estimator import Estimator
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.metrics.jump import AIRBORNE_FORCE, JointLimits, JumpRecorder
-from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
+from icub_jump_env.planning.plan import Planner
+from icub_jump_env.planning.scaled_curve import ScaledCurvePlanner
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
-from icub_jump_env.robot.statics import holding_torque
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.rendering import make_renderer
 from icub_jump_env.simulation.simulation import Simulation
@@ -124,12 +124,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         kinematics = FeetFixedKinematics(self.robot)
         self._estimator: Estimator = FeetFixedEstimator(kinematics)
         self._recorder = JumpRecorder(self._joint_limits(), cfg.success.stand_time)
-        crouch_q = kinematics.configuration(self.robot.crouch)
-        self._crouch_qpos = mujoco_qpos(crouch_q)
-        self._crouch_torque = holding_torque(self.robot, crouch_q)
-        self._controller = JumpController(
-            cfg.controller_config, cfg.residual, kinematics, self._crouch_torque
-        )
+        self._planner = self._make_planner(kinematics)
+        self._controller = JumpController(cfg.controller_config, cfg.residual, kinematics)
         self._residual_scale = np.array(cfg.residual.scale)
         self._state: RobotState
         self._start_com = np.zeros(3)
@@ -173,13 +169,10 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         episode = self.config.with_options(options)
         super().reset(seed=check_seed(seed))
         self._jump_height = episode.draw_height(self.np_random)
-        trajectory = plan_com_trajectory(
-            self._jump_height, episode.com_displacement, episode.com_scaling
-        )
-        ballistic = episode.controller_config.phases.launch_end == "lift_off"
-        plan = ScaledCurvePlan(trajectory, self.robot, ballistic)
-        simulation = self._simulation
-        simulation.reset(self.np_random, self._crouch_qpos, self._crouch_torque, plan.duration)
+        plan = self._planner.plan(self._jump_height)
+        simulation, stance = self._simulation, plan.stance
+        qpos = mujoco_qpos(stance.configuration)
+        simulation.reset(self.np_random, qpos, stance.torque, plan.duration)
         self._sense()
         self._start_com[:] = self._state.com
         self._controller.start(plan, self._state, simulation.physics.data.time)
@@ -318,6 +311,15 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         ):
             return "no take-off"
         return "running"
+
+    def _make_planner(self, kinematics: FeetFixedKinematics) -> Planner:
+        cfg = self.config
+        return ScaledCurvePlanner(
+            kinematics,
+            cfg.com_displacement,
+            cfg.com_scaling,
+            ballistic=cfg.controller_config.phases.launch_end == "lift_off",
+        )
 
     def _joint_limits(self) -> JointLimits:
         robot = self.robot

@@ -8,8 +8,10 @@ from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
 from icub_jump_env.robot.robot import load_robot
+from icub_jump_env.robot.statics import make_stance
 
 ROBOT = load_robot()
+STANCE = make_stance(FeetFixedKinematics(ROBOT), ROBOT.crouch)
 N = ROBOT.n_joints
 MODEL = build_pinocchio_model(ROBOT)
 SOLES = [MODEL.getFrameId(frame) for frame in ROBOT.sole_frames]

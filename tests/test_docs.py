@@ -9,9 +9,9 @@ import pytest
 
 from icub_jump_env import observation
 from icub_jump_env.control.config import TorqueConfig, VelocityConfig
-from icub_jump_env.control.flight import FLIGHT_MOTION_TIME
 from icub_jump_env.evaluation import cli
 from icub_jump_env.evaluation.options import EvalOptions
+from icub_jump_env.planning.scaled_curve import RETRACTION_TIME
 from icub_jump_env.simulation import tables
 from icub_jump_env.simulation.actuators.servo import ServoGains
 
@@ -121,7 +121,7 @@ def test_the_controller_page_states_the_gains_in_use():
         f"({servo.stiffness:g} Nm/rad, {servo.damping:g} Nm s/rad)",
         f"less than {phases.lift_off:g} N",
         f"({phases.touch_down:g} N)",
-        f"motion of {FLIGHT_MOTION_TIME:g} s",
+        f"motion of {RETRACTION_TIME:g} s",
     ):
         assert statement in page, statement
     assert velocity.com == velocity.momentum

@@ -14,9 +14,6 @@ from icub_jump_env.planning.residual import ResidualFilter
 
 Array = NDArray[np.float64]
 
-FLIGHT_MOTION_TIME = 0.12
-"""Duration of the minimum-jerk motion to the landing posture (s); a flight takes 0.19."""
-
 
 class MinimumJerkFlight:
     """Moves the joints to the landing posture and holds it."""
@@ -37,7 +34,7 @@ class MinimumJerkFlight:
     def start(self, state: RobotState, plan: JumpPlan, time: float) -> None:
         """Begin in ``state``, ``time`` (s) after the start of the jump."""
         self._motion = MinimumJerk(
-            state.joint_position.copy(), plan.landing_posture, FLIGHT_MOTION_TIME
+            state.joint_position.copy(), plan.landing_posture, plan.retraction_time
         )
         self._began = time
         self._residual.reset()

@@ -38,7 +38,6 @@ class JumpController:
         config: VelocityConfig | TorqueConfig,
         residual: ResidualConfig,
         kinematics: FeetFixedKinematics,
-        holding_torque: Array,
     ) -> None:
         """Set up the controller.
 
@@ -46,7 +45,6 @@ class JumpController:
             config: The controller of the launching phase, and when phases end.
             residual: How actions move the set point.
             kinematics: The model, which the estimator keeps up to date.
-            holding_torque: (n,) joint torques that hold the crouch (Nm).
         """
         dt = 1.0 / config.frequency
         self.residual = ResidualFilter(residual.bandwidth)
@@ -60,7 +58,7 @@ class JumpController:
             shift = kinematics.com_shift(kinematics.robot.landing)
         tracking: TrackingController
         if isinstance(config, TorqueConfig):
-            tracking = TorqueController(config, kinematics, holding_torque)
+            tracking = TorqueController(config, kinematics)
         else:
             tracking = VelocityController(config, kinematics)
         flight = MinimumJerkFlight(self.residual, dt, shift)

@@ -13,6 +13,7 @@ from icub_jump_env.control.qp.problem import QPReport
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.planning.plan import JumpPlan, Setpoint
 from icub_jump_env.planning.reference import Reference
+from icub_jump_env.robot.statics import Stance
 
 Array = NDArray[np.float64]
 
@@ -26,8 +27,8 @@ class TrackingController(Protocol):
 
     report: QPReport
 
-    def reset(self) -> None:
-        """Forget everything about earlier ticks."""
+    def reset(self, stance: Stance) -> None:
+        """Forget everything about earlier ticks; the robot stands at rest."""
         ...
 
     def command(self, state: RobotState, setpoint: Setpoint) -> JointCommand:
@@ -51,7 +52,7 @@ class Launch:
     def start(self, state: RobotState, plan: JumpPlan, time: float) -> None:
         """Begin in ``state``."""
         self._reference.start(plan, state.com)
-        self._controller.reset()
+        self._controller.reset(plan.stance)
 
     def tick(self, state: RobotState, time: float, residual_target: Array) -> Tick:
         """One control tick, as :class:`icub_jump_env.control.phases.PhaseController`."""

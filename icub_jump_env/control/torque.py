@@ -34,6 +34,7 @@ from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.statics import Stance
 
 Array = NDArray[np.float64]
 
@@ -48,15 +49,12 @@ class TorqueController:
         solution: (n + 12,) latest applied solution.
     """
 
-    def __init__(
-        self, config: TorqueConfig, kinematics: FeetFixedKinematics, holding_torque: Array
-    ) -> None:
+    def __init__(self, config: TorqueConfig, kinematics: FeetFixedKinematics) -> None:
         """Set up the QP.
 
         Args:
             config: Gains, weights and limits.
             kinematics: The model, which the estimator keeps up to date.
-            holding_torque: (n,) torques before the first tick (Nm).
 
         Raises:
             ConfigError: If weights do not fit the robot.
@@ -64,8 +62,7 @@ class TorqueController:
         self._config, self._kinematics = config, kinematics
         self._robot = robot = kinematics.robot
         self._dynamics = FeetFixedDynamics(kinematics)
-        self._holding_torque = holding_torque
-        self._previous = holding_torque.copy()
+        self._previous = np.zeros(robot.n_joints)
         self._posture_weight = robot.per_joint("posture_weight", config.posture_weight)
         self._smoothness_weight = robot.per_joint("smoothness_weight", config.smoothness_weight)
         self.solution = np.zeros(robot.n_joints + 12)
@@ -105,9 +102,9 @@ class TorqueController:
             solver=config.solver,
         )
 
-    def reset(self) -> None:
-        """Forget the previous torques."""
-        self._previous[:] = self._holding_torque
+    def reset(self, stance: Stance) -> None:
+        """Forget earlier ticks; the torques before the first one hold the stance."""
+        self._previous[:] = stance.torque
         self.solution[:] = 0.0
         self.report = IDLE
 

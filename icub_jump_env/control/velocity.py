@@ -28,6 +28,7 @@ from icub_jump_env.control.tasks.task import Task
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.statics import Stance
 
 Array = NDArray[np.float64]
 
@@ -86,8 +87,8 @@ class VelocityController:
             solver=config.solver,
         )
 
-    def reset(self) -> None:
-        """Forget the previous command and the momentum integral."""
+    def reset(self, stance: Stance) -> None:
+        """Forget the previous command and the momentum integral; the robot stands at rest."""
         self._previous[:] = 0.0
         self._integral[:] = 0.0
         self.report = IDLE

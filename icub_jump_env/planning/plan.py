@@ -8,6 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.robot.statics import Stance
+
 Array = NDArray[np.float64]
 
 
@@ -57,7 +59,9 @@ class JumpPlan(Protocol):
     Attributes:
         duration: Take-off time T (s).
         displacement: CoM rise in the launching phase (m).
+        stance: How the robot stands when the jump begins.
         landing_posture: (n,) posture of flight and landing (rad).
+        retraction_time: How long the motion to it takes in the air (s).
     """
 
     @property
@@ -67,8 +71,22 @@ class JumpPlan(Protocol):
     def displacement(self) -> float: ...  # noqa: D102
 
     @property
+    def stance(self) -> Stance: ...  # noqa: D102
+
+    @property
     def landing_posture(self) -> Array: ...  # noqa: D102
+
+    @property
+    def retraction_time(self) -> float: ...  # noqa: D102
 
     def sample(self, time: float) -> Setpoint:
         """The set point at ``time`` (s) after the start; the next call overwrites it."""
+        ...
+
+
+class Planner(Protocol):
+    """Makes the plans of one robot and controller."""
+
+    def plan(self, jump_height: float) -> JumpPlan:
+        """The plan of a jump to a commanded height (m)."""
         ...

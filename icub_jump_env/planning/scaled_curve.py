@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from icub_jump_env.errors import CommandNotScalableError
 from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.robot.icub import GRAVITY
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot
+from icub_jump_env.robot.statics import Stance, make_stance
 
 Array = NDArray[np.float64]
 
@@ -32,6 +34,10 @@ MAX_DISPLACEMENT = 0.15
 
 MAX_ACCELERATION = 25.0
 """Largest upward acceleration (m/s^2) of a reference; far more than the legs can give."""
+
+
+RETRACTION_TIME = 0.12
+"""Duration of the minimum-jerk motion to the landing posture (s); a flight takes 0.19."""
 
 
 @dataclass(frozen=True)
@@ -213,18 +219,26 @@ class ScaledCurvePlan:
 
     Attributes:
         trajectory: The scaled curve.
+        stance: The robot's crouch.
         landing_posture: (n,) posture of flight and landing (rad).
+        retraction_time: How long the motion to it takes in the air (s).
     """
 
-    def __init__(self, trajectory: ComTrajectory, robot: Robot, ballistic: bool = False) -> None:
+    retraction_time = RETRACTION_TIME
+
+    def __init__(
+        self, trajectory: ComTrajectory, robot: Robot, stance: Stance, ballistic: bool = False
+    ) -> None:
         """Make the plan.
 
         Args:
             trajectory: The scaled curve.
             robot: The robot.
+            stance: Its crouch.
             ballistic: Whether the CoM falls freely after T, instead of staying where it is.
         """
         self.trajectory = trajectory
+        self.stance = stance
         self._ballistic = ballistic
         self._setpoint = Setpoint.at_rest(robot.crouch)
         # A short launch takes off from a deeper crouch, from where the legs have to be
@@ -249,3 +263,32 @@ class ScaledCurvePlan:
         setpoint.com_velocity[2] = rise.velocity
         setpoint.com_acceleration[2] = rise.acceleration
         return setpoint
+
+
+class ScaledCurvePlanner:
+    """Makes scaled curves of one robot."""
+
+    def __init__(
+        self,
+        kinematics: FeetFixedKinematics,
+        com_displacement: float | None,
+        com_scaling: ComScaling,
+        ballistic: bool,
+    ) -> None:
+        """Set up the planner; arguments of :func:`plan_com_trajectory` and the plan.
+
+        Args:
+            kinematics: The model; it is updated for the crouch.
+            com_displacement: m.
+            com_scaling: What fixes the duration.
+            ballistic: Whether the CoM falls freely after T.
+        """
+        self._robot = kinematics.robot
+        self._stance = make_stance(kinematics, self._robot.crouch)
+        self._displacement, self._scaling = com_displacement, com_scaling
+        self._ballistic = ballistic
+
+    def plan(self, jump_height: float) -> ScaledCurvePlan:
+        """The plan of a jump to a commanded height (m)."""
+        trajectory = plan_com_trajectory(jump_height, self._displacement, self._scaling)
+        return ScaledCurvePlan(trajectory, self._robot, self._stance, self._ballistic)

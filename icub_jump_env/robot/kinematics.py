@@ -63,7 +63,8 @@ class FeetFixedKinematics:
         J_left: (6, 6) twist of the left foot of the left leg's joints, base frame.
         J_right: (6, 6) the same of the right foot.
         model: The Pinocchio model, shared; do not change it.
-        world_M_ankle: ``pinocchio.SE3`` of the left ankle roll joint, which stands still.
+        world_M_left_sole: ``pinocchio.SE3`` of the left sole frame, which stands still.
+        world_M_ankle: Likewise of the left ankle roll joint.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -110,8 +111,9 @@ class FeetFixedKinematics:
         left, right = (model.getFrameId(name) for name in self.robot.sole_frames)
         stance_width = abs(data.oMf[left].actInv(data.oMf[right]).translation[1])
         sole_position = np.array([0.0, stance_width / 2, -self.robot.sole.bottom])
+        self.world_M_left_sole = pin.SE3(np.eye(3), sole_position)
         frame = model.frames[left]
-        self.world_M_ankle = pin.SE3(np.eye(3), sole_position) * frame.placement.inverse()
+        self.world_M_ankle = self.world_M_left_sole * frame.placement.inverse()
         return int(frame.parentJoint)
 
     def configuration(self, posture: Array) -> Array:

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from standing import ROBOT, N, Standing
+from standing import ROBOT, STANCE, N, Standing
 
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.config import PhaseConfig, TorqueConfig, VelocityConfig
-from icub_jump_env.control.flight import FLIGHT_MOTION_TIME, MinimumJerkFlight
+from icub_jump_env.control.flight import MinimumJerkFlight
 from icub_jump_env.control.jump import JumpController
 from icub_jump_env.control.landing import HoldLanding
 from icub_jump_env.control.launch import Launch
@@ -19,7 +19,7 @@ from icub_jump_env.planning.residual import RESIDUAL_TIME, ResidualConfig, Resid
 from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
 
 DT = 1 / 256  # of which sums are exact
-PLAN = ScaledCurvePlan(plan_com_trajectory(0.04), ROBOT)
+PLAN = ScaledCurvePlan(plan_com_trajectory(0.04), ROBOT, STANCE)
 SHIFT = np.array([0.02, -0.01, 0.01])
 NOTHING = np.zeros(3)
 
@@ -32,7 +32,8 @@ class Recording:
     def __init__(self):
         self.asked, self.resets = [], 0
 
-    def reset(self):
+    def reset(self, stance):
+        assert stance is PLAN.stance
         self.resets += 1
 
     def command(self, state, setpoint):
@@ -79,7 +80,7 @@ class TestFlight:
         standing.move(2)  # the state is a buffer
         first, last = (
             flight.tick(standing.state, 0.5 + late, SHIFT)
-            for late in (0.0, FLIGHT_MOTION_TIME + 0.01)
+            for late in (0.0, PLAN.retraction_time + 0.01)
         )
         np.testing.assert_array_equal(first.command.position, start)
         np.testing.assert_allclose(last.command.position, PLAN.landing_posture, atol=1e-12)
@@ -137,7 +138,7 @@ class Jumper:
     def __init__(self, config, phases="all"):
         self.standing = Standing(0)
         self.controller = JumpController(
-            config, ResidualConfig(phases=phases), self.standing.kinematics, np.zeros(N)
+            config, ResidualConfig(phases=phases), self.standing.kinematics
         )
 
     def jump(self, began, plan=PLAN):
@@ -175,7 +176,7 @@ def test_a_jump_does_not_depend_on_when_it_begins(name):
 def test_a_second_jump_is_like_the_first(name):
     """Whatever came before it: integrals, previous commands, residual and phase are new."""
     used = Jumper(CONFIGS[name])
-    used.jump(0.0, ScaledCurvePlan(plan_com_trajectory(0.03), ROBOT))
+    used.jump(0.0, ScaledCurvePlan(plan_com_trajectory(0.03), ROBOT, STANCE))
     Jumper(CONFIGS[name]).same_jump(used.jump(2.0))
 
 

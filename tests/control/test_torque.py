@@ -8,7 +8,7 @@ import pytest
 from conftest import jump
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from standing import GRAVITY, MODEL, ROBOT, N, Oracle, Standing
+from standing import GRAVITY, MODEL, ROBOT, STANCE, N, Oracle, Standing
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ContactConfig, TorqueConfig
@@ -30,10 +30,11 @@ class Case:
 
     def __init__(self, seed, time=0.3, **options):
         self.standing = standing = Standing(seed)
-        self.holding = standing.rng.normal(size=N)
+        self.stance = STANCE._replace(torque=standing.rng.normal(size=N))
         self.config = TorqueConfig(**options)
-        self.subject = TorqueController(self.config, standing.kinematics, self.holding)
-        planned = ScaledCurvePlan(plan_com_trajectory(0.04), ROBOT).sample(time)
+        self.subject = TorqueController(self.config, standing.kinematics)
+        self.subject.reset(self.stance)
+        planned = ScaledCurvePlan(plan_com_trajectory(0.04), ROBOT, STANCE).sample(time)
         self.wanted = standing.setpoint
         self.wanted.com_velocity[:] = planned.com_velocity
         self.wanted.com_acceleration[:] = planned.com_acceleration
@@ -138,7 +139,7 @@ def test_equals_the_textbook_form(seed, momentum_control, time):
     case = Case(seed, time, momentum_control=momentum_control)
     torque = case.tick()
     assert case.subject.report.status is QPStatus.SOLVED
-    np.testing.assert_allclose(torque, textbook(case, case.holding), atol=1e-5)
+    np.testing.assert_allclose(torque, textbook(case, case.stance.torque), atol=1e-5)
 
 
 @settings(max_examples=15)
@@ -162,7 +163,7 @@ def test_equals_the_textbook_form_at_any_weights_gains_and_set_points(seed, cons
         contact=ContactConfig(friction=draw(0.4, 0.8), minimum_force=draw(5.0, 30.0)),
     )
     case.ask_for_what_can_be_had()
-    previous = case.holding
+    previous = case.stance.torque
     for _ in range(2):
         torque = case.tick()
         assert case.subject.report.status is QPStatus.SOLVED
@@ -242,7 +243,7 @@ def test_reset_forgets():
     used, fresh = Case(0), Case(0)
     used.wanted.com_acceleration[2] += 3.0
     used.tick()
-    used.subject.reset()
+    used.subject.reset(used.stance)
     used.wanted.com_acceleration[2] -= 3.0
     np.testing.assert_allclose(used.tick(), fresh.tick(), atol=1e-9)
 
@@ -299,7 +300,7 @@ class TestHardConstraints:
         assert not soft.subject.report.failed
         np.testing.assert_array_equal(*answers)
         np.testing.assert_array_equal(hard.subject.solution, soft.subject.solution)
-        assert np.abs(answers[0] - hard.holding).max() > 1.0
+        assert np.abs(answers[0] - hard.stance.torque).max() > 1.0
         hard.ask_for_what_can_be_had()
         hard.tick()
         assert not hard.subject.report.failed

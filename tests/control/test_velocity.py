@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from standing import MODEL, ROBOT, N, Oracle, Standing
+from standing import MODEL, ROBOT, STANCE, N, Oracle, Standing
 
 from icub_jump_env.control.config import VelocityConfig
 from icub_jump_env.control.qp.problem import QPSolution, QPStatus
@@ -307,7 +307,7 @@ def test_reset_makes_a_controller_as_new():
     for seed in range(5):
         standing.move(seed)
         tick(used, standing, [0.0, 0.0, 0.3])
-    used.reset()
+    used.reset(STANCE)
     for seed in range(3):
         standing.move(seed)
         commands = [tick(subject, standing, [0.0, 0.0, 0.2]) for subject in (used, fresh)]

@@ -16,9 +16,12 @@ from icub_jump_env.planning.scaled_curve import (
     takeoff_velocity,
 )
 from icub_jump_env.robot.icub import GRAVITY
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import load_robot
+from icub_jump_env.robot.statics import make_stance
 
 ROBOT = load_robot()
+STANCE = make_stance(FeetFixedKinematics(ROBOT), ROBOT.crouch)
 CURVES = [DISPLACEMENT_CURVE, ACCELERATION_CURVE]
 
 
@@ -107,7 +110,7 @@ def test_the_largest_height_named_in_a_refusal_is_accepted():
 
 class TestPlan:
     def plan(self, displacement=None, ballistic=False):
-        return ScaledCurvePlan(plan_com_trajectory(0.04, displacement), ROBOT, ballistic)
+        return ScaledCurvePlan(plan_com_trajectory(0.04, displacement), ROBOT, STANCE, ballistic)
 
     def test_the_com_follows_the_curve_straight_up(self):
         plan = self.plan()

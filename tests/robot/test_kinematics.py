@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from icub_jump_env.robot.kinematics import FeetFixedKinematics, build_pinocchio_model
 from icub_jump_env.robot.robot import load_robot
-from icub_jump_env.robot.statics import holding_torque
+from icub_jump_env.robot.statics import make_stance
 
 ROBOT = load_robot()
 
@@ -101,11 +101,11 @@ def test_robot_faces_forward():
     np.testing.assert_allclose(kinematics.base_rotation @ [-1, 0, 0], [1, 0, 0], atol=1e-12)
 
 
-def test_holding_torque_balances_gravity():
+def test_the_torques_of_a_stance_balance_gravity():
     kinematics = FeetFixedKinematics(ROBOT)
-    kinematics.update(ROBOT.crouch)
-    q = floating_base(kinematics, ROBOT.crouch)
-    torque = holding_torque(ROBOT, q)
+    posture, q, torque = make_stance(kinematics, ROBOT.crouch)
+    np.testing.assert_array_equal(posture, ROBOT.crouch)
+    np.testing.assert_allclose(q, floating_base(kinematics, ROBOT.crouch), atol=1e-12)
     gravity = pin.computeGeneralizedGravity(model, model.createData(), q)
     J = np.vstack([foot_jacobian(q, frame) for frame in ROBOT.sole_frames])
     residual = gravity - np.concatenate((np.zeros(6), torque))
