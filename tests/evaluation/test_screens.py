@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import types
 import urllib.error
 import urllib.parse
@@ -108,8 +109,19 @@ serves = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
 @pytest.fixture
 def browser_screen():
-    yield pytest.importorskip("icub_jump_env.simulation.viewers.browser").BrowserScreen
-    gc.collect()
+    """Studio crashes where a viewer meets native threads of an earlier one: wait for their end."""
+    kind = pytest.importorskip("icub_jump_env.simulation.viewers.browser").BrowserScreen
+    threads = psutil.Process().num_threads()
+
+    class LoneScreen(kind):
+        def close(self):
+            super().close()
+            gc.collect()
+            deadline = time.monotonic() + PATIENCE
+            while psutil.Process().num_threads() > threads and time.monotonic() < deadline:
+                time.sleep(0.01)
+
+    return LoneScreen
 
 
 @serves
