@@ -16,9 +16,9 @@ from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
 from icub_jump_env.observation import OBSERVATION_LIMIT, entry_scales
 from icub_jump_env.planning.residual import RESIDUAL_TIME
-from icub_jump_env.planning.scaled_curve import plan_com_trajectory
 from icub_jump_env.policy import Policy
 from icub_jump_env.policy.fields import AXES
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float32]
 Env = gymnasium.Env[Any, Any]
@@ -30,10 +30,8 @@ def acting_steps(config: JumpConfig) -> int:
     And of flight and landing, if the residual acts there.
     """
     # The lowest jump launches longest, or the highest: that depends on the scaling.
-    longest = max(
-        plan_com_trajectory(height, config.com_displacement, config.com_scaling).duration
-        for height in config.jump_heights
-    )
+    planner = config.make_planner(FeetFixedKinematics(config.robot_value))
+    longest = max(planner.plan(height).duration for height in config.jump_heights)
     if config.residual.phases == "all":
         longest += RESIDUAL_TIME
     return math.ceil(longest * config.agent_frequency)

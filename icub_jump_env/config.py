@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Self, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -28,13 +29,21 @@ from icub_jump_env.control.config import (
 )
 from icub_jump_env.errors import ConfigError, UnknownFieldError
 from icub_jump_env.metrics.jump import SuccessConfig
+from icub_jump_env.planning.plan import Planner, PlannerName
 from icub_jump_env.planning.residual import ResidualConfig
 from icub_jump_env.planning.scaled_curve import (
     MAX_DISPLACEMENT,
     ComScaling,
+    ScaledCurvePlanner,
     plan_com_trajectory,
 )
+from icub_jump_env.planning.whole_body.family import (
+    PlanFamily,
+    WholeBodyPlanner,
+    family_of,
+)
 from icub_jump_env.reward import RewardConfig
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot, load_robot
 from icub_jump_env.robot.urdf import DEFAULT_MODEL
 from icub_jump_env.shortcuts import PATHS, path_to
@@ -72,6 +81,9 @@ class JumpConfig:
             ``TorqueConfig``.
         jump_height: Commanded rise of the CoM in flight (m); lowest and highest, if each
             episode draws its own.
+        planner: What the launch follows: the paper's scaled CoM curve from a fixed crouch, or
+            whole-body plans within the robot's limits.
+        plans: File of whole-body plans; by default the family of the package.
         com_displacement: Rise of the CoM in the launching phase (m); by default the
             paper's 0.11 with scaling by displacement.
         com_scaling: What fixes the duration of the launch: the CoM displacement, or a
@@ -98,6 +110,8 @@ class JumpConfig:
     ankle_shift: bool = True
     controller: ControllerName | VelocityConfig | TorqueConfig = "velocity"
     jump_height: float | tuple[float, float] = 0.04
+    planner: PlannerName = "scaled_curve"
+    plans: str | None = None
     com_displacement: float | None = None
     com_scaling: ComScaling = "displacement"
     residual: ResidualConfig = field(default_factory=ResidualConfig)
@@ -129,8 +143,50 @@ class JumpConfig:
         )
         self._check_groups()
         self._check_rates()
+        self._check_plan()
+
+    def _check_plan(self) -> None:
+        check_choice("planner", self.planner, get_args(PlannerName))
+        if self.planner == "scaled_curve":
+            if self.plans is not None:
+                raise ConfigError("plans", self.plans, "None with planner='scaled_curve'")
+            for height in self.jump_heights:
+                plan_com_trajectory(height, self.com_displacement, self.com_scaling)
+            return
+        for name, value, allowed in (
+            ("com_displacement", self.com_displacement, None),
+            ("com_scaling", self.com_scaling, "displacement"),
+            ("launch_end", self.controller_config.phases.launch_end, "time"),
+            ("ankle_shift", self.ankle_shift, True),
+        ):
+            if value != allowed:
+                raise ConfigError(name, value, f"{allowed!r} with planner='whole_body'")
+        if self.plans is not None:
+            check_type("plans", self.plans, str, Path)
+            store(self, plans=str(self.plans))
         for height in self.jump_heights:
-            plan_com_trajectory(height, self.com_displacement, self.com_scaling)
+            self.plan_family.check_height(height)
+
+    @property
+    def plan_family(self) -> PlanFamily:
+        """The whole-body plans.
+
+        Raises:
+            PlanFileError: If there are none of this robot and controller.
+        """
+        path = None if self.plans is None else Path(self.plans)
+        return family_of(self.robot_value, self.controller_name, path)
+
+    def make_planner(self, kinematics: FeetFixedKinematics) -> Planner:
+        """What plans the jumps.
+
+        Args:
+            kinematics: The model of the robot; the planner updates it.
+        """
+        if self.planner == "whole_body":
+            return WholeBodyPlanner(self.plan_family, kinematics)
+        ballistic = self.controller_config.phases.launch_end == "lift_off"
+        return ScaledCurvePlanner(kinematics, self.com_displacement, self.com_scaling, ballistic)
 
     def _check_groups(self) -> None:
         for name, presets, kind in (

@@ -20,8 +20,6 @@ from icub_jump_env.estimation.estimator import Estimator
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.metrics.jump import AIRBORNE_FORCE, JointLimits, JumpRecorder
-from icub_jump_env.planning.plan import Planner
-from icub_jump_env.planning.scaled_curve import ScaledCurvePlanner
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
@@ -63,7 +61,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     :func:`icub_jump_env.reward.reward_terms`.
 
     ## Starting state
-    At rest in the crouch, soles flat on the floor, the world origin on the floor midway
+    At rest in the plan's crouch, soles flat on the floor, the world origin on the floor midway
     between the feet. World +x is where the robot faces, +y left, +z up; positive pitch
     about +y.
 
@@ -124,7 +122,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         kinematics = FeetFixedKinematics(self.robot)
         self._estimator: Estimator = FeetFixedEstimator(kinematics)
         self._recorder = JumpRecorder(self._joint_limits(), cfg.success.stand_time)
-        self._planner = self._make_planner(kinematics)
+        self._planner = cfg.make_planner(kinematics)
         self._controller = JumpController(cfg.controller_config, cfg.residual, kinematics)
         self._residual_scale = np.array(cfg.residual.scale)
         self._state: RobotState
@@ -311,15 +309,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         ):
             return "no take-off"
         return "running"
-
-    def _make_planner(self, kinematics: FeetFixedKinematics) -> Planner:
-        cfg = self.config
-        return ScaledCurvePlanner(
-            kinematics,
-            cfg.com_displacement,
-            cfg.com_scaling,
-            ballistic=cfg.controller_config.phases.launch_end == "lift_off",
-        )
 
     def _joint_limits(self) -> JointLimits:
         robot = self.robot

@@ -84,6 +84,18 @@ class CommandNotScalableError(ConfigError):
     """No CoM trajectory of the chosen scaling reaches the commanded jump."""
 
 
+class PlanningError(ICubJumpError, RuntimeError):
+    """No plan keeps the limits."""
+
+
+class HeightNotReachableError(ConfigError):
+    """No plan of the robot reaches the commanded height."""
+
+
+class PlanFileError(ICubJumpError, ValueError):
+    """A file of plans is missing, damaged, or of another robot or controller."""
+
+
 class MissingDependencyError(ICubJumpError, RuntimeError):
     """An optional package or a system library is missing; the message names the remedy."""
 

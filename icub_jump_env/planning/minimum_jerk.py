@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+PEAK_SPEED = 1.875
+"""Largest speed of the motion, in way per duration."""
+
+
+def progress(u: Any) -> tuple[Any, Any]:
+    """Share of the way, and its derivative, at a share ``u`` of the duration."""
+    return u**3 * (10 - 15 * u + 6 * u**2), 30 * u**2 * (1 - u) ** 2
 
 
 class MinimumJerk:
@@ -31,6 +42,5 @@ class MinimumJerk:
     def sample(self, time: float) -> tuple[Array, Array]:
         """Position (rad) and velocity (rad/s) at ``time`` (s) after the start."""
         u = min(max(time / self._duration, 0.0), 1.0)
-        progress = u**3 * (10 - 15 * u + 6 * u**2)
-        rate = 30 * u**2 * (1 - u) ** 2 / self._duration
-        return self._start + progress * self._path, rate * self._path
+        done, rate = progress(u)
+        return self._start + done * self._path, rate / self._duration * self._path

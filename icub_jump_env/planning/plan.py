@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from icub_jump_env.robot.statics import Stance
 
 Array = NDArray[np.float64]
+
+PlannerName = Literal["scaled_curve", "whole_body"]
 
 
 @dataclass(slots=True)

@@ -34,6 +34,7 @@ FORMAT = 1
 TASK_FIELDS = (
     "robot",
     "controller",
+    "planner",
     "com_displacement",
     "com_scaling",
     "momentum_control",
@@ -179,7 +180,7 @@ def _check_config(config: Any) -> JumpConfig:
     given = check_mapping("config", config)
     # What it was before there was a choice.
     implied = {} if "residual" in given else {"residual_bandwidth": 15.0}
-    explicit = {"robot": DEFAULT_MODEL, **implied, **given}
+    explicit = {"robot": DEFAULT_MODEL, "planner": "scaled_curve", **implied, **given}
     checked = JumpConfig.of(**explicit)
     for field in TASK_FIELDS:
         # Else the policy would change with the default.

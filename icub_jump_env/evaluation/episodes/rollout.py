@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
-from icub_jump_env.planning.scaled_curve import ComTrajectory, plan_com_trajectory
+from icub_jump_env.planning.plan import JumpPlan
 from icub_jump_env.policy import BASELINE, Policy
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.snapshot import Snapshot
 
 Frame = NDArray[np.uint8]
@@ -58,11 +59,10 @@ def traced(config: JumpConfig) -> JumpConfig:
     return dataclasses.replace(config, agent_frequency=config.controller_config.frequency)
 
 
-def planned(config: JumpConfig) -> ComTrajectory:
-    """The vertical CoM trajectory that a configuration with a single command asks for."""
-    return plan_com_trajectory(
-        config.commanded_height, config.com_displacement, config.com_scaling
-    )
+def planned(config: JumpConfig) -> JumpPlan:
+    """The plan of a configuration with a single command."""
+    planner = config.make_planner(FeetFixedKinematics(config.robot_value))
+    return planner.plan(config.commanded_height)
 
 
 def run_episode(

@@ -61,17 +61,16 @@ def paper_figures(
 
 def com_reference_figure(config: JumpConfig) -> Figure:
     """Fig. 1: vertical CoM reference, velocity and acceleration."""
-    trajectory = planned(config)
-    time = np.linspace(0.0, trajectory.duration, 400)
-    samples = [trajectory.sample(t) for t in time]
+    plan = planned(config)
+    time = np.linspace(0.0, plan.duration, 400)
     figure, ((velocity, acceleration),) = panels((8.0, 3.2), columns=2)
-    velocity.plot(time, [s.velocity for s in samples], color=DESIRED)
+    velocity.plot(time, [plan.sample(t).com_velocity[2] for t in time], color=DESIRED)
     describe(velocity, "vertical CoM velocity", "m/s")
-    acceleration.plot(time, [s.acceleration for s in samples], color=DESIRED)
+    acceleration.plot(time, [plan.sample(t).com_acceleration[2] for t in time], color=DESIRED)
     describe(acceleration, "vertical CoM acceleration", "m/s²")
     figure.suptitle(
         f"Fig. 1: CoM reference, {commands(*config.jump_heights)} jump, "
-        f"{CM * trajectory.displacement:.3g} cm displacement"
+        f"{CM * plan.displacement:.3g} cm displacement"
     )
     return figure
 

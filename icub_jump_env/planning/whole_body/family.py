@@ -1,0 +1,237 @@
+"""Families of whole-body plans over the commanded height, and their files.
+
+A family is an npz file with the joint trajectories and, beside it, a JSON card that says how
+they were made. Neither can carry code, and following them needs no CasADi.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from icub_jump_env.errors import HeightNotReachableError, PlanFileError
+from icub_jump_env.files import read_json, strict_json, write_files
+from icub_jump_env.planning.whole_body.plan import JointKnots, WholeBodyPlan
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+FORMAT = 1
+"""Format of the files."""
+
+MAX_SIZE = 2**24
+"""Largest file that is read (bytes)."""
+
+SHIPPED = Path(__file__).parent / "shipped"
+"""Families of the default robot."""
+
+_DIMENSIONS = {
+    "rise": 1, "branch": 1, "duration": 1,
+    "position": 3, "velocity": 3, "acceleration": 3, "landing": 2,
+}  # fmt: skip
+"""Arrays of the file, and the number of their dimensions; the first is the plan."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanFamily:
+    """Plans of one robot and controller, by ascending rise within each branch.
+
+    Attributes:
+        rise: (m,) rise that the controller makes of each plan in the nominal simulation (m).
+        branch: (m,) plans of one branch can be interpolated; branches ascend, and overlap.
+        duration: (m,) T (s).
+        position, velocity, acceleration: (m, k, n) joints at the knots (rad, rad/s, rad/s^2).
+        landing: (m, n) posture of flight and landing (rad).
+        card: How they were made; plain values.
+    """
+
+    rise: Array
+    branch: NDArray[np.int64]
+    duration: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    landing: Array
+    card: Mapping[str, Any]
+
+    @property
+    def lowest(self) -> float:
+        """Lowest command (m)."""
+        return float(self.rise[0])
+
+    @property
+    def highest(self) -> float:
+        """Highest command (m)."""
+        return float(self.rise[-1])
+
+    def check_height(self, jump_height: float) -> None:
+        """Refuse a command that no plan reaches.
+
+        Raises:
+            HeightNotReachableError: Naming the range, and what binds at the highest plan.
+        """
+        if jump_height > self.highest:
+            raise HeightNotReachableError(
+                "jump_height",
+                jump_height,
+                f"at most {math.floor(1e4 * self.highest) / 1e4} m with planner='whole_body' and the "
+                f"{self.card['controller']} controller, where the plan is bound by "
+                f"{', '.join(self.card['plans'][-1]['binding'])}",
+            )
+        if jump_height < self.lowest:
+            raise HeightNotReachableError(
+                "jump_height",
+                jump_height,
+                f"at least {math.ceil(1e4 * self.lowest) / 1e4} m with planner='whole_body'",
+            )
+
+    def knots(self, jump_height: float) -> tuple[JointKnots, Array]:
+        """Joint trajectories and landing posture (n,) of a command (m), interpolated.
+
+        Raises:
+            HeightNotReachableError: If no plan reaches it.
+        """
+        self.check_height(jump_height)
+        reaching = [
+            b for b in np.unique(self.branch) if jump_height <= self.rise[self.branch == b][-1]
+        ]
+        members = np.flatnonzero(self.branch == reaching[0])
+        rise = self.rise[members]
+        after = min(max(int(np.searchsorted(rise, jump_height)), 1), len(rise) - 1)
+        share = (jump_height - rise[after - 1]) / (rise[after] - rise[after - 1])
+        pair = members[[after - 1, after]]
+        weights = np.array([1.0 - share, share])
+
+        def mix(values: Array) -> Array:
+            mixed: Array = np.tensordot(weights, values, 1)
+            return mixed
+
+        # The trajectories are interpolated over the share of T, hence their rates.
+        T = self.duration[pair]
+        duration = float(mix(T))
+        scale = T[:, None, None] / duration
+        knots = JointKnots(
+            duration,
+            mix(self.position[pair]),
+            mix(self.velocity[pair] * scale),
+            mix(self.acceleration[pair] * scale**2),
+        )
+        return knots, mix(self.landing[pair])
+
+    def save(self, path: Path) -> None:
+        """Write the ``.npz`` file and its ``.json`` card.
+
+        Raises:
+            OSError: If the file system refuses.
+        """
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, **{name: getattr(self, name) for name in _DIMENSIONS})
+        content = buffer.getvalue()
+        card = {**self.card, "sha256": hashlib.sha256(content).hexdigest()}
+        text = strict_json(card, indent=2) + "\n"
+        write_files({path.with_suffix(".npz"): content, path.with_suffix(".json"): text.encode()})
+
+
+def load_family(path: Path) -> PlanFamily:
+    """Read a family.
+
+    Args:
+        path: The ``.npz`` file or its ``.json`` card.
+
+    Raises:
+        PlanFileError: If a file is missing or damaged, or they do not belong together.
+    """
+    arrays_file, card_file = path.with_suffix(".npz"), path.with_suffix(".json")
+    for file in (arrays_file, card_file):
+        if not file.is_file():
+            raise PlanFileError(
+                f"{file}: no such file; python -m icub_jump_env.planning makes one"
+            )
+        if file.stat().st_size > MAX_SIZE:
+            raise PlanFileError(f"{file}: larger than {MAX_SIZE} bytes")
+    content = arrays_file.read_bytes()
+    try:
+        card = read_json(card_file.read_bytes())
+    except ValueError as error:
+        raise PlanFileError(f"{card_file}: not readable as JSON ({error})") from None
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise PlanFileError(f"{card_file}: not a card of format {FORMAT}")
+    if card.get("sha256") != hashlib.sha256(content).hexdigest():
+        raise PlanFileError(f"{arrays_file}: damaged, or not the file that the card is of")
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            values = {name: arrays[name] for name in _DIMENSIONS}
+    except (KeyError, ValueError, OSError) as error:
+        raise PlanFileError(f"{arrays_file}: not a family of plans ({error})") from None
+    for name, dimensions in _DIMENSIONS.items():
+        value = values[name]
+        if value.ndim != dimensions or len(value) != len(values["rise"]):
+            raise PlanFileError(f"{arrays_file}: {name} has the shape {value.shape}")
+        if not np.isfinite(value).all():
+            raise PlanFileError(f"{arrays_file}: {name} is not finite")
+        value.setflags(write=False)
+    return PlanFamily(**values, card=card)
+
+
+@functools.lru_cache(maxsize=16)
+def family_of(robot: Robot, controller: str, path: Path | None = None) -> PlanFamily:
+    """The family of a robot and a controller.
+
+    Args:
+        robot: The robot.
+        controller: Name of the controller.
+        path: File of the family; by default the one of the package.
+
+    Raises:
+        PlanFileError: If there is none, or it is of another robot or controller.
+    """
+    file = SHIPPED / f"{robot.name}-{controller}.npz" if path is None else path
+    family = load_family(file)
+    for name, ours in (
+        ("robot", robot.name), ("controller", controller), ("model", model_hash(robot)),
+    ):  # fmt: skip
+        if family.card.get(name) != ours:
+            raise PlanFileError(f"{file}: {name} is {family.card.get(name)!r} instead of {ours!r}")
+    return family
+
+
+def model_hash(robot: Robot) -> str:
+    """What the plans of a robot depend on, as a hash in hexadecimal."""
+    return hashlib.sha256(robot.urdf().encode()).hexdigest()
+
+
+class WholeBodyPlanner:
+    """Makes plans of a family; that of the latest command is kept."""
+
+    def __init__(self, family: PlanFamily, kinematics: FeetFixedKinematics) -> None:
+        """Set up the planner.
+
+        Args:
+            family: The plans.
+            kinematics: The model; a new command updates it for the crouch.
+        """
+        self._family, self._kinematics = family, kinematics
+        self._latest: tuple[float, WholeBodyPlan] | None = None
+
+    def plan(self, jump_height: float) -> WholeBodyPlan:
+        """The plan of a jump to a commanded height (m).
+
+        Raises:
+            HeightNotReachableError: If no plan reaches it.
+        """
+        if self._latest is None or self._latest[0] != jump_height:
+            knots, landing = self._family.knots(jump_height)
+            retraction = self._family.card["margins"]["landing"]["retraction"]
+            plan = WholeBodyPlan(knots, landing, retraction, self._kinematics)
+            self._latest = jump_height, plan
+        return self._latest[1]

@@ -1,0 +1,191 @@
+"""Making whole-body plans: the sagittal model, the program, and what the shipped plans keep."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from icub_jump_env.planning.whole_body.family import family_of
+from icub_jump_env.planning.whole_body.margins import BRANCHES
+from icub_jump_env.robot.dynamics import FeetFixedDynamics
+from icub_jump_env.robot.icub import GRAVITY
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.robot import load_robot
+from icub_jump_env.robot.urdf import mesh_root, model_path
+
+pytest.importorskip("casadi")
+
+from icub_jump_env.planning.whole_body.launch import LaunchProgram
+from icub_jump_env.planning.whole_body.sagittal import (
+    COORDINATES,
+    SagittalModel,
+    chest_pitch,
+    coordinates,
+    selection,
+)
+
+ROBOT = load_robot()
+FAMILY = family_of(ROBOT, "velocity")
+
+
+@pytest.fixture(scope="module")
+def model():
+    return SagittalModel(ROBOT, BRANCHES[0].launch.shoulder_roll)
+
+
+def values(model, q, v, a):
+    outputs = model.dynamics(q, v, a)
+    return {
+        name: np.array(value).ravel()
+        for name, value in zip(model.dynamics.name_out(), outputs, strict=True)
+    }
+
+
+def full(model, q, v, a):
+    """Torques, ground force and moment, CoM, momentum of the robot with all its joints."""
+    S = selection(ROBOT)
+    s, s_dot, s_ddot = model.posture(q), S @ v, S @ a
+    kinematics = FeetFixedKinematics(ROBOT)
+    kinematics.update(s)
+    dynamics = FeetFixedDynamics(kinematics)
+    dynamics.update(s, s_dot)
+    n = ROBOT.n_joints
+    # Both feet carry the same: forces along x and z, moments about y.
+    same = np.zeros((3, 12))
+    for row, column in enumerate((0, 2, 4)):
+        same[row, [column, column + 6]] = 1.0, -1.0
+    wanted = dynamics.base_bias - dynamics.base_rows[:, :n] @ s_ddot
+    f = np.linalg.lstsq(
+        np.vstack((dynamics.base_rows[:, n:], same)), np.append(wanted, np.zeros(3)), rcond=None
+    )[0]
+    torque = dynamics.torque_rows @ np.concatenate((s_ddot, f)) + dynamics.torque_bias
+    force, moment = f[:3] + f[6:9], f[4] + f[10]
+    data = kinematics.model.createData()
+    pin.framesForwardKinematics(kinematics.model, data, kinematics.configuration(s))
+    for frame, (forward, _, up) in zip(ROBOT.sole_frames, (f[:3], f[6:9]), strict=True):
+        x, _, z = data.oMf[kinematics.model.getFrameId(frame)].translation
+        moment += z * forward - x * up
+    momentum = (kinematics.J_momentum @ s_dot)[1]
+    return torque, force, moment, kinematics.com, kinematics.J_com @ s_dot, momentum
+
+
+@pytest.mark.parametrize("robot", ["iCubGenova04", "iCubGenova02", "iCubGazeboV2_7"])
+def test_the_model_is_the_full_one(robot, rng, monkeypatch):
+    monkeypatch.setitem(globals(), "ROBOT", load_robot(robot))
+    model = SagittalModel(ROBOT, 0.5)
+    left = [name for name in ROBOT.joint_names if not name.startswith("r_")]
+    columns = [
+        ROBOT.joint_names.index(next(j for j in left if j.removeprefix("l_") == coordinate))
+        for coordinate in COORDINATES
+    ]
+    for _ in range(5):
+        q = coordinates(ROBOT, ROBOT.crouch) + 0.2 * rng.normal(size=6)
+        v, a = 3 * rng.normal(size=6), 30 * rng.normal(size=6)
+        found = values(model, q, v, a)
+        torque, force, moment, com, com_velocity, momentum = full(model, q, v, a)
+        np.testing.assert_allclose(found["force"], force[[0, 2]], atol=1e-4)
+        np.testing.assert_allclose(found["moment"], moment, atol=1e-3)
+        np.testing.assert_allclose(found["com"], com[[0, 2]], atol=1e-9)
+        np.testing.assert_allclose(found["com_velocity"], com_velocity[[0, 2]], atol=1e-9)
+        np.testing.assert_allclose(found["momentum"], momentum, atol=1e-9)
+        # What the inertias of left and right differ in loads their legs differently.
+        np.testing.assert_allclose(found["torque"], torque[columns], atol=0.1)
+
+
+def test_the_rate_of_the_momentum(model, rng):
+    q = coordinates(ROBOT, ROBOT.crouch)
+    v, a, h = rng.normal(size=6), 10 * rng.normal(size=6), 1e-6
+    before, after = (
+        values(model, q + sign * h * v + h**2 * a / 2, v + sign * h * a, a) for sign in (-1, 1)
+    )
+    rate = (after["momentum"] - before["momentum"]) / (2 * h)
+    np.testing.assert_allclose(values(model, q, v, a)["momentum_rate"], rate, atol=1e-5)
+
+
+def test_the_pitch_of_the_chest(model, rng):
+    kinematics = FeetFixedKinematics(ROBOT)
+    q = coordinates(ROBOT, ROBOT.crouch) + 0.1 * rng.normal(size=6)
+    data = kinematics.model.createData()
+    pin.framesForwardKinematics(kinematics.model, data, kinematics.configuration(model.posture(q)))
+    chest = data.oMf[kinematics.model.getFrameId(ROBOT.chest_link)].rotation
+    upright = data_of_upright(kinematics, model)
+    pitch = pin.log3(chest @ upright.T)
+    np.testing.assert_allclose(pitch, [0.0, chest_pitch(q[:, None])[0], 0.0], atol=1e-6)
+
+
+def data_of_upright(kinematics, model):
+    """Orientation of the chest where its pitch is zero."""
+    data = kinematics.model.createData()
+    q = kinematics.configuration(model.posture(np.zeros(6)))
+    pin.framesForwardKinematics(kinematics.model, data, q)
+    return data.oMf[kinematics.model.getFrameId(ROBOT.chest_link)].rotation.copy()
+
+
+@pytest.mark.parametrize("member", range(len(FAMILY.rise)))
+def test_shipped_plans_keep_their_margins(model, member):
+    margins = BRANCHES[FAMILY.branch[member]].launch
+    speed = margins.speed * coordinates(ROBOT, ROBOT.velocity_limit)
+    torque = margins.torque * coordinates(ROBOT, ROBOT.effort_limit)
+    close = 1 + 1e-4
+    sole = ROBOT.sole
+    for s, s_dot, s_ddot in zip(
+        FAMILY.position[member], FAMILY.velocity[member], FAMILY.acceleration[member], strict=True
+    ):
+        q, v, a = (coordinates(ROBOT, x) for x in (s, s_dot, s_ddot))
+        found = values(model, q, v, a)
+        assert (np.abs(v) <= speed * close).all()
+        assert (np.abs(found["torque"]) <= torque * close).all()
+        forward, up = found["force"]
+        assert up >= (margins.least_load - 1e-4) * model.mass * GRAVITY
+        assert abs(forward) <= margins.friction * up * close
+        cop = -found["moment"][0] / up
+        assert sole.x_min + margins.cop - 1e-4 <= cop <= sole.x_max - margins.cop + 1e-4
+    assert found["com_velocity"][0] == pytest.approx(margins.forward_speed, abs=1e-4)
+    assert margins.momentum[0] - 1e-4 <= found["momentum"][0] <= margins.momentum[1] + 1e-4
+
+
+def test_a_search_finds_the_shipped_plan_again(model):
+    branch = BRANCHES[0]
+    program = LaunchProgram(model, branch.launch)
+    highest = program.highest(*branch.starts[0])
+    assert highest.feasible
+    assert highest.rise > branch.highest
+    launch = program.to_height(0.05, highest, highest.q[0])
+    assert launch.feasible
+    assert launch.rise == pytest.approx(0.05, abs=1e-6)
+    member = next(
+        index for index, plan in enumerate(FAMILY.card["plans"]) if plan["height"] == 0.05
+    )
+    np.testing.assert_allclose(model.posture(launch.q), FAMILY.position[member], atol=2e-2)
+
+
+def test_no_link_meets_another():
+    """On the convex hulls of the meshes, along the launch and the way to the landing posture."""
+    coal = pytest.importorskip("coal")
+    path = str(model_path(ROBOT.name))
+    full_model = pin.buildModelFromUrdf(path, pin.JointModelFreeFlyer())
+    geometry = pin.buildGeomFromUrdf(
+        full_model, path, pin.GeometryType.COLLISION, package_dirs=[str(mesh_root().parent)]
+    )
+    for shape in geometry.geometryObjects:
+        if isinstance(shape.geometry, coal.BVHModelBase):
+            shape.geometry.buildConvexHull(False, "Qt")
+            shape.geometry = shape.geometry.convex
+    geometry.addAllCollisionPairs()
+    index = [full_model.joints[full_model.getJointId(j)].idx_q for j in ROBOT.joint_names]
+
+    def penetrating(posture):
+        q = pin.neutral(full_model)
+        q[index] = posture
+        data, results = full_model.createData(), pin.GeometryData(geometry)
+        pin.computeCollisions(full_model, data, geometry, results, q, False)
+        return {
+            pair for pair, result in enumerate(results.collisionResults) if result.isCollision()
+        }
+
+    # Neighbours overlap in any posture.
+    neighbours = penetrating(ROBOT.crouch) | penetrating(ROBOT.landing)
+    for member in range(0, len(FAMILY.rise), 3):
+        launch, landing = FAMILY.position[member], FAMILY.landing[member]
+        way = [launch[-1] + share * (landing - launch[-1]) for share in (0.3, 0.6, 1.0)]
+        for posture in (*launch[::6], *way):
+            assert penetrating(posture) <= neighbours, (member, np.degrees(posture))
