@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self, TypeVar, get_args, get_type_hints
+from typing import Any, Self, get_args
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from icub_jump_env.control.config import (
     VelocityConfig,
 )
 from icub_jump_env.errors import ConfigError, UnknownFieldError
+from icub_jump_env.mappings import nested
 from icub_jump_env.metrics.jump import SuccessConfig
 from icub_jump_env.planning.plan import Planner, PlannerName
 from icub_jump_env.planning.residual import ResidualConfig
@@ -60,9 +61,6 @@ from icub_jump_env.simulation.sensor_models import (
     SensorConfig,
     SensorName,
 )
-
-T = TypeVar("T")
-
 
 JUMP_HEIGHT_RANGE = (0.01, 0.15)
 DISPLACEMENT_RANGE = (0.03, MAX_DISPLACEMENT)
@@ -213,7 +211,7 @@ class JumpConfig:
         """A group, made of the plain mapping that a file has in its place."""
         value = getattr(self, name)
         if isinstance(value, Mapping):
-            value = _nested(name, value, JumpConfig)
+            value = nested(name, value, JumpConfig)
             store(self, **{name: value})
         return value
 
@@ -397,34 +395,3 @@ def _check_heights(heights: Any) -> float | tuple[float, float]:
     if isinstance(heights, list | tuple | np.ndarray):
         return check_range("jump_height", heights, *JUMP_HEIGHT_RANGE, "m")
     return check_number("jump_height", heights, *JUMP_HEIGHT_RANGE, "m")
-
-
-def _from_mapping(name: str, values: Mapping[str, Any], kind: type[T]) -> T:
-    """A ``kind`` from a plain mapping, such as a configuration that was saved as JSON."""
-    hints = get_type_hints(kind)
-    for key, value in values.items():
-        if key not in hints:
-            allowed = f"no such field; the fields of {name} are {', '.join(hints)}"
-            raise UnknownFieldError(str(key), value, allowed)
-    return kind(**{key: _nested(key, value, kind) for key, value in values.items()})
-
-
-def _nested(name: str, value: Any, owner: type) -> Any:
-    """The field ``name`` of an ``owner``; where that is a dataclass, a mapping stands for it.
-
-    Where there are several dataclasses to choose from, its ``kind`` says which.
-    """
-    hint = get_type_hints(owner)[name]
-    options = [t for t in (hint, *get_args(hint)) if dataclasses.is_dataclass(t)]
-    if not options or not isinstance(value, Mapping):
-        return value
-    return _from_mapping(name, value, _choose(name, value, options))
-
-
-def _choose(name: str, values: Mapping[str, Any], options: list[Any]) -> Any:
-    if len(options) == 1:
-        return options[0]
-    by_kind = {option.kind: option for option in options}
-    kind = values.get("kind")
-    check_choice(f"{name}.kind", kind, tuple(by_kind))
-    return by_kind[kind]

@@ -24,6 +24,7 @@ LAYERS = (
     ("control",),
     ("estimation", "planning", "metrics"),
     ("robot",),
+    ("mappings",),
     ("checks", "files"),
     ("errors",),
 )
@@ -47,7 +48,7 @@ AGENTS = sorted((REPOSITORY / "agents").glob("*.py"))
 @pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
 def test_dependencies_run_one_way(file):
     own = file.relative_to(PACKAGE).with_suffix("").parts[0]
-    if own == "__init__":
+    if own == "__init__" or file.name == "__main__.py":  # a command uses whatever it needs
         return
     for name in imports(file):
         parts = name.split(".")

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.config import ControllerName
 from icub_jump_env.errors import PlanningError
 from icub_jump_env.planning.whole_body.family import FORMAT, PlanFamily, model_hash
 from icub_jump_env.planning.whole_body.landing import LandingProgram
@@ -31,7 +30,7 @@ _BINDS = 0.995
 """Share of a limit from which on it binds."""
 
 
-def build_family(robot: Robot, controller: ControllerName, margins: FamilyMargins) -> PlanFamily:
+def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanFamily:
     """Optimise the plans of a robot.
 
     Their ``rise`` is that of the plan; :func:`icub_jump_env.evaluation.calibration.calibrate`
