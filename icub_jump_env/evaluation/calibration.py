@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import PlanningError
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.episodes.series import perturbed
-from icub_jump_env.planning.whole_body.family import PlanFamily
+from icub_jump_env.planning.whole_body.family import ARRAYS, PlanFamily
 
 REPETITIONS = 5
 """Jumps with each plan, link masses within 0.1 %; seeds from 0, which are for tuning."""
@@ -21,6 +22,9 @@ def calibrate(family: PlanFamily) -> PlanFamily:
 
     Plans with which a jump falls are left out; so are those of a branch that rise no higher than
     a lower plan of it.
+
+    Raises:
+        PlanningError: If fewer than two plans of a branch are left.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "family.npz"
@@ -51,8 +55,8 @@ def calibrate(family: PlanFamily) -> PlanFamily:
         for plan, value, keep in zip(family.card["plans"], rise, kept, strict=True)
         if keep
     ]
-    arrays = {
-        name: getattr(family, name)[kept]
-        for name in ("branch", "duration", "position", "velocity", "acceleration", "landing")
-    }
+    for branch in np.unique(family.branch):
+        if (family.branch[kept] == branch).sum() < 2:
+            raise PlanningError(f"branch {branch} has fewer than two plans that land")
+    arrays = {name: getattr(family, name)[kept] for name in ARRAYS if name != "rise"}
     return PlanFamily(rise=rise[kept], **arrays, card={**family.card, "plans": plans})

@@ -70,6 +70,7 @@ def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanF
         velocity=np.array([launch.v @ S.T for _, _, launch, _ in plans]),
         acceleration=np.array([launch.a @ S.T for _, _, launch, _ in plans]),
         landing=np.array([model.posture(landing) for _, model, _, landing in plans]),
+        retraction=np.full(len(plans), margins.landing.retraction),
         card=card,
     )
 

@@ -37,9 +37,12 @@ SHIPPED = Path(__file__).parent / "shipped"
 
 _DIMENSIONS = {
     "rise": 1, "branch": 1, "duration": 1,
-    "position": 3, "velocity": 3, "acceleration": 3, "landing": 2,
+    "position": 3, "velocity": 3, "acceleration": 3, "landing": 2, "retraction": 1,
 }  # fmt: skip
 """Arrays of the file, and the number of their dimensions; the first is the plan."""
+
+ARRAYS = tuple(_DIMENSIONS)
+"""Their names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,8 @@ class PlanFamily:
         duration: (m,) T (s).
         position, velocity, acceleration: (m, k, n) joints at the knots (rad, rad/s, rad/s^2).
         landing: (m, n) posture of flight and landing (rad).
-        card: How they were made; plain values.
+        retraction: (m,) duration of the motion to it (s).
+        card: How they were made; plain values. What binds in each plan stands there.
     """
 
     rise: Array
@@ -62,6 +66,7 @@ class PlanFamily:
     velocity: Array
     acceleration: Array
     landing: Array
+    retraction: Array
     card: Mapping[str, Any]
 
     @property
@@ -95,8 +100,12 @@ class PlanFamily:
                 f"at least {math.ceil(1e4 * self.lowest) / 1e4} m with planner='whole_body'",
             )
 
-    def knots(self, jump_height: float) -> tuple[JointKnots, Array]:
-        """Joint trajectories and landing posture (n,) of a command (m), interpolated.
+    def plan(self, jump_height: float, kinematics: FeetFixedKinematics) -> WholeBodyPlan:
+        """The plan of a command (m), interpolated.
+
+        Args:
+            jump_height: The command.
+            kinematics: The model; it is updated for the crouch.
 
         Raises:
             HeightNotReachableError: If no plan reaches it.
@@ -126,7 +135,9 @@ class PlanFamily:
             mix(self.velocity[pair] * scale),
             mix(self.acceleration[pair] * scale**2),
         )
-        return knots, mix(self.landing[pair])
+        return WholeBodyPlan(
+            knots, mix(self.landing[pair]), float(mix(self.retraction[pair])), kinematics
+        )
 
     def save(self, path: Path) -> None:
         """Write the ``.npz`` file and its ``.json`` card.
@@ -180,10 +191,37 @@ def load_family(path: Path) -> PlanFamily:
         if not np.isfinite(value).all():
             raise PlanFileError(f"{arrays_file}: {name} is not finite")
         value.setflags(write=False)
-    return PlanFamily(**values, card=card)
+    family = PlanFamily(**values, card=card)
+    _check(arrays_file, family)
+    return family
 
 
-@functools.lru_cache(maxsize=16)
+def _check(file: Path, family: PlanFamily) -> None:
+    """Refuse what cannot be interpolated, and a card without what errors quote.
+
+    Raises:
+        PlanFileError: If something does not fit.
+    """
+    shape = family.position.shape
+    if not (family.velocity.shape == family.acceleration.shape == shape and shape[1] > 1):
+        raise PlanFileError(f"{file}: joint trajectories of different shapes")
+    if family.landing.shape[1] != shape[2]:
+        raise PlanFileError(f"{file}: a landing posture of other joints")
+    steps, new = np.diff(family.rise), np.diff(family.branch) != 0
+    members = np.unique(family.branch, return_counts=True)[1]
+    if not members.size or members.min() < 2 or (steps[~new] <= 0).any():
+        raise PlanFileError(f"{file}: each branch needs two plans or more, in ascending order")
+    if not (family.duration > 0).all() or not (family.retraction > 0).all():
+        raise PlanFileError(f"{file}: durations that are not positive")
+    plans = family.card.get("plans")
+    if not isinstance(plans, list) or len(plans) != shape[0]:
+        raise PlanFileError(f"{file}: a card of other plans")
+    for plan in plans:
+        binding = plan.get("binding") if isinstance(plan, dict) else None
+        if not isinstance(binding, list) or not all(isinstance(word, str) for word in binding):
+            raise PlanFileError(f"{file}: a card that does not say what binds")
+
+
 def family_of(robot: Robot, controller: str, path: Path | None = None) -> PlanFamily:
     """The family of a robot and a controller.
 
@@ -195,8 +233,17 @@ def family_of(robot: Robot, controller: str, path: Path | None = None) -> PlanFa
     Raises:
         PlanFileError: If there is none, or it is of another robot or controller.
     """
-    file = SHIPPED / f"{robot.name}-{controller}.npz" if path is None else path
+    file = SHIPPED / f"{robot.name}-{controller}.npz" if path is None else path.with_suffix(".npz")
+    written = file.stat().st_mtime_ns if file.is_file() else None
+    return _family_of(robot, controller, file, written)
+
+
+@functools.lru_cache(maxsize=16)
+def _family_of(robot: Robot, controller: str, file: Path, written: int | None) -> PlanFamily:
+    """The family in a file, read once for each time that it is written."""
     family = load_family(file)
+    if family.position.shape[2] != robot.n_joints:
+        raise PlanFileError(f"{file}: trajectories of other joints")
     for name, ours in (
         ("robot", robot.name), ("controller", controller), ("model", model_hash(robot)),
     ):  # fmt: skip
@@ -230,8 +277,5 @@ class WholeBodyPlanner:
             HeightNotReachableError: If no plan reaches it.
         """
         if self._latest is None or self._latest[0] != jump_height:
-            knots, landing = self._family.knots(jump_height)
-            retraction = self._family.card["margins"]["landing"]["retraction"]
-            plan = WholeBodyPlan(knots, landing, retraction, self._kinematics)
-            self._latest = jump_height, plan
+            self._latest = jump_height, self._family.plan(jump_height, self._kinematics)
         return self._latest[1]

@@ -14,13 +14,18 @@ from icub_jump_env.robot.statics import make_stance
 
 Array = NDArray[np.float64]
 
-# Quintic on u in [0, 1] from position, velocity and acceleration at both ends (per u).
-_ENDS = np.array(
-    [[0.0] * k + [1.0] + [0.0] * (5 - k) for k in range(3)]
-    + [[1.0] * 6, [*range(6)], [k * (k - 1) for k in range(6)]]
-) * np.array([[1.0], [1.0], [2.0], [1.0], [1.0], [1.0]])
-_QUINTIC = np.linalg.inv(_ENDS)
-_POWERS = np.arange(6)
+# Quintic on u in [0, 1] from value, first and second derivative at both ends: its coefficients
+# solve this system.
+_QUINTIC = np.linalg.inv(
+    [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 2.0, 0.0, 0.0, 0.0],
+        [1.0, 1.0, 1.0, 1.0, 1.0, 1.0],
+        [0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
+        [0.0, 0.0, 2.0, 6.0, 12.0, 20.0],
+    ]
+)
 
 
 class JointKnots(NamedTuple):
@@ -84,19 +89,7 @@ class WholeBodyPlan:
         )
         ends = np.stack([d[:-1] for d in derivatives] + [d[1:] for d in derivatives], axis=1)
         self._coefficients = _QUINTIC @ ends
-        n = knots.position.shape[1]
-        self._values = values = np.zeros((3, n + 6))
-        posture, com_part = slice(0, n), slice(n, n + 3)
-        self._setpoint = Setpoint(
-            com_position=values[0, com_part],
-            com_velocity=values[1, com_part],
-            com_acceleration=values[2, com_part],
-            angular_momentum=values[1, n + 3 :],
-            angular_momentum_rate=values[2, n + 3 :],
-            posture=values[0, posture],
-            posture_velocity=values[1, posture],
-            posture_acceleration=values[2, posture],
-        )
+        self._setpoint = Setpoint.at_rest(knots.position[0])
 
     def sample(self, time: float) -> Setpoint:
         """The set point at ``time`` (s) in [0, T]; the next call overwrites it."""
@@ -112,8 +105,18 @@ class WholeBodyPlan:
                 [0.0, 0.0, 2 / dt**2, 6 * u / dt**2, 12 * u2 / dt**2, 20 * u3 / dt**2],
             ]
         )
-        np.dot(powers, self._coefficients[k], out=self._values)
-        return self._setpoint
+        values, rates, accelerations = powers.dot(self._coefficients[k])
+        setpoint = self._setpoint
+        n = len(setpoint.posture)
+        setpoint.posture[:] = values[:n]
+        setpoint.posture_velocity[:] = rates[:n]
+        setpoint.posture_acceleration[:] = accelerations[:n]
+        setpoint.com_position[:] = values[n : n + 3]
+        setpoint.com_velocity[:] = rates[n : n + 3]
+        setpoint.com_acceleration[:] = accelerations[n : n + 3]
+        setpoint.angular_momentum[:] = rates[n + 3 :]
+        setpoint.angular_momentum_rate[:] = accelerations[n + 3 :]
+        return setpoint
 
 
 def centroidal(

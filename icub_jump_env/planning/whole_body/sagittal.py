@@ -8,6 +8,7 @@ those of the full model, too, up to what a lateral asymmetry of its inertias add
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -15,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from icub_jump_env.robot import icub
 from icub_jump_env.robot.dynamics import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot
@@ -44,12 +46,6 @@ def coordinates(robot: Robot, posture: Array) -> Array:
 def chest_pitch(q: Any) -> Any:
     """Pitch of the chest (rad) with the soles level, of coordinates (6, ...)."""
     return -q[ANKLE, :] + q[KNEE, :] + q[HIP, :] + q[TORSO, :]
-
-
-def frame_posture(robot: Robot, shoulder_roll: float) -> Array:
-    """Where the joints are that do not move (n,) (rad), the others at 0: arms off the body."""
-    rolls = [name.endswith("shoulder_roll") for name in robot.joint_names]
-    return np.where(rolls, shoulder_roll, 0.0)
 
 
 class _Joint(NamedTuple):
@@ -135,7 +131,7 @@ class SagittalModel:
 
     def __init__(self, robot: Robot, shoulder_roll: float) -> None:
         self.robot = robot
-        self.frame = frame_posture(robot, shoulder_roll)
+        self.frame = icub.posture(shoulder_roll=math.degrees(shoulder_roll))
         self._kinematics = FeetFixedKinematics(robot)
         self.mass = self._kinematics.mass
         self.dynamics = self._make_dynamics()
