@@ -11,6 +11,7 @@ from conftest import ZERO, jump, rollout
 from icub_jump_env import PhaseConfig, TorqueConfig, VelocityConfig
 from icub_jump_env.control.phases import Phase
 from icub_jump_env.env import ICubJumpEnv
+from icub_jump_env.robot.frames import mujoco_qpos
 
 ROBOTS = ("iCubGenova04", "iCubGenova02", "iCubGenova01")
 
@@ -46,9 +47,10 @@ class TestRobots:
         env.reset(seed=0)
         weight = 9.81 * env.model.body_mass.sum()
         assert env.data.sensor("floor_force").data[3] == pytest.approx(weight, rel=1e-3)
-        assert abs(env.data.qpos[2] - env._crouch_qpos[2]) < 1e-3
+        crouch = mujoco_qpos(env._controller.plan.stance.configuration)
+        assert abs(env.data.qpos[2] - crouch[2]) < 1e-3
         assert env._simulation.truth.read().sole_height == pytest.approx(0.0, abs=1e-3)
-        env._simulation.physics.reset(env._crouch_qpos)
+        env._simulation.physics.reset(crouch)
         # The right foot follows from the legs, which the URDF has not quite symmetric.
         assert env._simulation.truth.read().sole_height == pytest.approx(0.0, abs=2e-4)
 
