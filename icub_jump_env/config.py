@@ -89,6 +89,7 @@ class JumpConfig:
         residual: How actions move the reference.
         agent_frequency: Rate of ``env.step`` (Hz), a divisor of the control rate.
         timestep: Physics step (s).
+        self_collision: Let the robot's links touch each other.
         actuators: Model of servos, low-level torque control and motors: a name or an
             ``ActuatorConfig``.
         sensors: Errors of the sensors: a name or a ``SensorConfig``.
@@ -115,6 +116,7 @@ class JumpConfig:
     residual: ResidualConfig = field(default_factory=ResidualConfig)
     agent_frequency: float = 100.0
     timestep: float = 0.001
+    self_collision: bool = False
     actuators: ActuatorName | ActuatorConfig = "ideal"
     sensors: SensorName | SensorConfig = "ideal"
     command_delay: int = 0
@@ -124,7 +126,8 @@ class JumpConfig:
     rendering: RenderConfig = field(default_factory=RenderConfig)
 
     def __post_init__(self) -> None:
-        store(self, ankle_shift=check_flag("ankle_shift", self.ankle_shift))
+        for name in ("ankle_shift", "self_collision"):
+            store(self, **{name: check_flag(name, getattr(self, name))})
         check_type("robot", self.robot, str)
         load_robot(self.robot, self.ankle_shift)
         check_choice("com_scaling", self.com_scaling, get_args(ComScaling))

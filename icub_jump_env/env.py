@@ -21,10 +21,12 @@ from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.metrics.jump import AIRBORNE_FORCE, JointLimits, JumpRecorder
 from icub_jump_env.reward import reward_terms
+from icub_jump_env.robot.collision import TOLERANCE
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.rendering import make_renderer
+from icub_jump_env.simulation.self_collision import SelfCollision
 from icub_jump_env.simulation.simulation import Simulation
 from icub_jump_env.snapshot import Snapshot
 
@@ -33,6 +35,9 @@ FALLEN_TILT = math.radians(60.0)
 
 TAKEOFF_GRACE = 0.5
 """Time after T (s) within which the robot must have left the ground."""
+
+LOOK_PERIOD = 0.01
+"""How often links are looked at that may be in each other (s)."""
 
 
 class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -113,7 +118,12 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         cfg, self.robot = self.config, self.config.robot_value
         self._simulation = Simulation(
-            Physics(self.robot, cfg.timestep, visuals=self.render_mode is not None),
+            Physics(
+                self.robot,
+                cfg.timestep,
+                visuals=self.render_mode is not None,
+                self_collision=cfg.self_collision,
+            ),
             cfg.actuator_config,
             cfg.sensor_config,
             cfg.randomization_config,
@@ -122,6 +132,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         kinematics = FeetFixedKinematics(self.robot)
         self._estimator: Estimator = FeetFixedEstimator(kinematics)
         self._recorder = JumpRecorder(self._joint_limits(), cfg.success.stand_time)
+        self._self_collision = SelfCollision(self.robot)
+        self._next_look = 0.0
         self._planner = cfg.make_planner(kinematics)
         self._controller = JumpController(cfg.controller_config, cfg.residual, kinematics)
         self._residual_scale = np.array(cfg.residual.scale)
@@ -175,6 +187,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._start_com[:] = self._state.com
         self._controller.start(plan, self._state, simulation.physics.data.time)
         self._recorder.reset()
+        self._next_look = 0.0
         self._outcome = "running"
         self._report = IDLE
         self._observe()
@@ -288,7 +301,16 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._outcome = self._judge()
             if self._outcome != "running":
                 break
+        self._look_for_overlap()
         self._sense()
+
+    def _look_for_overlap(self) -> None:
+        data = self._simulation.physics.data
+        if data.time < self._next_look - 1e-9:
+            return
+        self._next_look = data.time + LOOK_PERIOD
+        if self._self_collision.overlap(data.qpos) > TOLERANCE:
+            self._recorder.metrics.self_collisions += 1.0
 
     def _sense(self) -> None:
         """From readings to the believed state, once per control tick."""

@@ -108,6 +108,8 @@ class JumpMetrics:
         solver_failures: Control ticks whose QP solution was not applied.
         limit_violations: Physics steps with a joint beyond 1.03 x its speed limit, or
             beyond its torque or position limit.
+        self_collisions: Control ticks, but no more than 100 a second, at which links were in
+            each other; neighbours at a joint do not count.
     """
 
     takeoff_time: float = UNDEFINED
@@ -128,6 +130,7 @@ class JumpMetrics:
     landed: bool = False
     solver_failures: float = 0.0
     limit_violations: float = 0.0
+    self_collisions: float = 0.0
 
     def is_success(self, jump_height: float, success: SuccessConfig) -> bool:
         """Whether the jump to a commanded height (m) landed, high and long enough."""

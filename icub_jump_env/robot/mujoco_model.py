@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from xml.sax.saxutils import quoteattr
 
@@ -9,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.robot.collision import CAPSULES, LINK_PAIRS
 from icub_jump_env.robot.icub import BASE_YAW, FEET_FRICTION
 from icub_jump_env.robot.robot import Robot
 from icub_jump_env.robot.urdf import mesh_root
@@ -35,7 +37,9 @@ def sole_geom(side: str) -> str:
     return f"{side}_sole_contact"
 
 
-def build_model(robot: Robot, timestep: float, visuals: bool = False) -> mujoco.MjModel:
+def build_model(
+    robot: Robot, timestep: float, visuals: bool = False, self_collision: bool = False
+) -> mujoco.MjModel:
     """Compile the iCub with a free base, one motor per joint, on a flat floor.
 
     Links keep their URDF names; body 1 is the base with the free joint. Each joint
@@ -46,6 +50,7 @@ def build_model(robot: Robot, timestep: float, visuals: bool = False) -> mujoco.
         robot: The robot.
         timestep: Physics step (s).
         visuals: Load the iCub's meshes. They have no effect on the dynamics.
+        self_collision: Let the links touch each other.
 
     Returns:
         The compiled model.
@@ -68,6 +73,8 @@ def build_model(robot: Robot, timestep: float, visuals: bool = False) -> mujoco.
         geom.group = VISUAL_GROUP
     spec.body(robot.base_link).add_freejoint(name="base")
     _add_contact_geometry(spec, robot)
+    if self_collision:
+        _add_self_collision(spec)
     _add_motors(spec, robot)
     _add_sensors(spec, robot)
     _add_scenery(spec)
@@ -75,7 +82,7 @@ def build_model(robot: Robot, timestep: float, visuals: bool = False) -> mujoco.
 
 
 def _add_contact_geometry(spec: mujoco.MjSpec, robot: Robot) -> None:
-    # The robot's geoms collide with the floor only, not with each other.
+    # These collide with the floor only, not with each other.
     spec.worldbody.add_geom(
         name=FLOOR_GEOM,
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -112,6 +119,27 @@ def _add_contact_geometry(spec: mujoco.MjSpec, robot: Robot) -> None:
             group=COLLISION_GROUP,
             rgba=_BOX_COLOR,
         )
+
+
+def _add_self_collision(spec: mujoco.MjSpec) -> None:
+    for link, capsules in CAPSULES.items():
+        for k, (start, end, radius) in enumerate(capsules):
+            spec.body(link).add_geom(
+                name=f"{link}_capsule_{k}",
+                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+                fromto=[*start, *end],
+                size=[radius, 0.0, 0.0],
+                contype=0,
+                conaffinity=0,
+                mass=0.0,
+                group=COLLISION_GROUP,
+                rgba=_BOX_COLOR,
+            )
+    for links in LINK_PAIRS:
+        for indices in itertools.product(*(range(len(CAPSULES[link])) for link in links)):
+            first, second = (f"{link}_capsule_{k}" for link, k in zip(links, indices, strict=True))
+            # Covers are smooth: no friction.
+            spec.add_pair(name=f"{first} {second}", geomname1=first, geomname2=second, condim=1)
 
 
 def _add_motors(spec: mujoco.MjSpec, robot: Robot) -> None:

@@ -34,9 +34,15 @@ class Physics:
             that depends on the state: the beginning of the last step.
     """
 
-    def __init__(self, robot: Robot, timestep: float, visuals: bool = False) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        timestep: float,
+        visuals: bool = False,
+        self_collision: bool = False,
+    ) -> None:
         self.robot = robot
-        self.model = build_model(robot, timestep, visuals)
+        self.model = build_model(robot, timestep, visuals, self_collision)
         self.data = mujoco.MjData(self.model)
         self._bind()
 

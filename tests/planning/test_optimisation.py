@@ -4,13 +4,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from experiments.collision_shapes import hulls
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.planning.whole_body.family import family_of
 from icub_jump_env.planning.whole_body.margins import BRANCHES
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import load_robot
-from icub_jump_env.robot.urdf import mesh_root, model_path
+from icub_jump_env.robot.urdf import model_path
 
 pytest.importorskip("casadi")
 
@@ -161,34 +164,54 @@ def test_a_search_finds_the_shipped_plan_again(model):
     )
 
 
-def test_no_link_meets_another():
-    """On the convex hulls of the meshes, along the launch and the way to the landing posture."""
-    coal = pytest.importorskip("coal")
-    path = str(model_path(ROBOT.name))
-    full_model = pin.buildModelFromUrdf(path, pin.JointModelFreeFlyer())
-    geometry = pin.buildGeomFromUrdf(
-        full_model, path, pin.GeometryType.COLLISION, package_dirs=[str(mesh_root().parent)]
-    )
-    for shape in geometry.geometryObjects:
-        if isinstance(shape.geometry, coal.BVHModelBase):
-            shape.geometry.buildConvexHull(False, "Qt")
-            shape.geometry = shape.geometry.convex
-    geometry.addAllCollisionPairs()
-    index = [full_model.joints[full_model.getJointId(j)].idx_q for j in ROBOT.joint_names]
+class Hulls:
+    """The convex hulls of the meshes."""
 
-    def penetrating(posture):
-        q = pin.neutral(full_model)
-        q[index] = posture
-        data, results = full_model.createData(), pin.GeometryData(geometry)
-        pin.computeCollisions(full_model, data, geometry, results, q, False)
-        return {
-            pair for pair, result in enumerate(results.collisionResults) if result.isCollision()
-        }
+    def __init__(self):
+        path = str(model_path(ROBOT.name))
+        self.model = pin.buildModelFromUrdf(path, pin.JointModelFreeFlyer())
+        self.geometry = hulls(self.model, ROBOT)
+        self.geometry.addAllCollisionPairs()
+        names = ROBOT.joint_names
+        self.index = [self.model.joints[self.model.getJointId(j)].idx_q for j in names]
+        # Neighbours overlap in any posture.
+        self.neighbours = set()
+        for posture in (ROBOT.crouch, ROBOT.landing):
+            self.neighbours |= self.meeting(posture)
 
-    # Neighbours overlap in any posture.
-    neighbours = penetrating(ROBOT.crouch) | penetrating(ROBOT.landing)
+    def meeting(self, posture):
+        """Pairs of links that overlap, but for neighbours."""
+        q = pin.neutral(self.model)
+        q[self.index] = posture
+        data, results = self.model.createData(), pin.GeometryData(self.geometry)
+        pin.computeCollisions(self.model, data, self.geometry, results, q, False)
+        found = {k for k, result in enumerate(results.collisionResults) if result.isCollision()}
+        return found - self.neighbours
+
+
+@pytest.fixture(scope="module")
+def mesh_hulls():
+    pytest.importorskip("coal")
+    return Hulls()
+
+
+def test_no_link_meets_another_in_the_plans(mesh_hulls):
+    """Along the launch and the way to the landing posture."""
     for member in range(0, len(FAMILY.rise), 3):
         launch, landing = FAMILY.position[member], FAMILY.landing[member]
         way = [launch[-1] + share * (landing - launch[-1]) for share in (0.3, 0.6, 1.0)]
         for posture in (*launch[::6], *way):
-            assert penetrating(posture) <= neighbours, (member, np.degrees(posture))
+            assert not mesh_hulls.meeting(posture), (member, np.degrees(posture))
+
+
+@pytest.mark.parametrize("controller", ["velocity", "torque"])
+def test_no_link_meets_another_in_the_highest_jump(mesh_hulls, controller):
+    highest = family_of(ROBOT, controller).highest
+    env = make_env(JumpConfig.of(planner="whole_body", jump_height=highest, controller=controller))
+    env.reset(seed=0)
+    terminated = False
+    while not terminated:
+        *_, terminated, _, info = env.step(np.zeros(3))
+        assert not mesh_hulls.meeting(env.data.qpos[7:]), info["time"]
+    assert info["outcome"] == "stood"
+    assert info["jump"]["self_collisions"] == 0.0
