@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,12 +11,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiments.shipped import CURVE_SUFFIX
-from icub_jump_env.evaluation.figures.style import CONTENDERS, CONTROLLER, Figure, panels
+from icub_jump_env.evaluation.figures.style import (
+    CONTENDERS,
+    CONTROLLER,
+    DESIRED,
+    MEASURED,
+    Figure,
+    panels,
+)
 from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT
 from icub_jump_env.evaluation.statistics.intervals import interquartile_mean
 
 if TYPE_CHECKING:
     from experiments.frontier import Point
+    from experiments.planners import Point as PlannerPoint
 
 
 def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
@@ -54,6 +63,40 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
     axis.set(xlabel="success (%)", ylabel="mean CoM rise (cm)")
     axis.set_title("command / displacement (cm)", fontsize=9)
     axis.legend(frameon=False)
+    return figure
+
+
+def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
+    """Mean rise over the landing rate, a panel for each controller; labels name the command (cm)."""
+    figure, (axes,) = panels((10.0, 4.6), columns=len(CONTROLLERS), sharey=True)
+    colors = dict(zip(("scaled_curve", "whole_body"), (DESIRED, MEASURED), strict=True))
+    fills = {"full": "full", "hard": "none"}
+    for axis, controller in zip(axes, CONTROLLERS, strict=True):
+        for (planner, color), (world, fill) in itertools.product(colors.items(), fills.items()):
+            shown = [
+                p
+                for p in points
+                if (p.controller, p.planner, p.world) == (controller, planner, world)
+            ]
+            share = PERCENT * np.array([p.landed.share for p in shown])
+            rise = CM * np.array([p.rises.mean() for p in shown])
+            shares = PERCENT * np.array([p.landed.interval for p in shown]).T
+            rises = CM * np.array([p.rise_interval for p in shown]).T
+            axis.errorbar(
+                share, rise, np.abs(rises - rise), np.abs(shares - share), "o", color=color,
+                fillstyle=fill, elinewidth=0.7, ms=5, label=f"{planner}, {world}",
+            )  # fmt: skip
+            for x, y, point in zip(share, rise, shown, strict=True):
+                left = fill == "none"
+                axis.annotate(
+                    f"{CM * point.jump_height:g}", (x, y), textcoords="offset points",
+                    xytext=(-5 if left else 5, 4), ha="right" if left else "left", fontsize=7,
+                    color=color,
+                )  # fmt: skip
+        axis.set_title(f"{controller} controller", fontsize=10)
+        axis.set(xlabel="landed (%)", xlim=(None, 103), ylim=(0, None))
+    axes[0].set_ylabel("mean CoM rise (cm)")
+    axes[0].legend(frameon=False, loc="lower left", fontsize=8)
     return figure
 
 

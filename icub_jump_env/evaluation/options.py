@@ -18,7 +18,7 @@ STUDY_EPISODES = 20
 """Episodes of each case of a study."""
 MOST_EPISODES = 1_000_000
 
-_MODES = ("compare", "study", "sweep", "report", "view")
+_MODES = ("compare", "study", "sweep", "max_height", "report", "view")
 _COMMON = ("config", "shortcuts", "seed")
 _USED = {
     "nominal": ("episodes", "policy", "json", "plot", "video"),
@@ -26,6 +26,7 @@ _USED = {
     "compare": ("episodes", "jobs", "resume", "json", "plot"),
     "study": ("episodes", "jobs", "json", "plot"),
     "sweep": ("jobs", "json", "plot"),
+    "max_height": ("jobs", "json"),
     "report": (),
     "view": ("policy",),
 }
@@ -34,6 +35,7 @@ _USED = {
 _CHOSEN_BY_MODE = {
     "study": ("controller",),
     "sweep": ("controller", "jump_height", "com_displacement", "randomization"),
+    "max_height": ("jump_height", "com_displacement", "randomization"),
     "report": ("controller",),
 }
 """Fields of the configuration that a mode sets itself."""
@@ -58,6 +60,8 @@ class EvalOptions:
         study: What changes the jump: the realism of actuators and sensors, the task as cost or
             constraint, what ends the launch, the robot.
         sweep: Desired height against displacement, for both controllers.
+        max_height: The highest whole-body plan and the highest jump that stands, for both
+            controllers, with what binds.
         report: Write one self-contained HTML page into this folder (extra 'video').
         view: Show the jump live, in the browser or in a window.
         results: Where an evaluation of several episodes keeps them as they come; by
@@ -80,6 +84,7 @@ class EvalOptions:
     jobs: int = 1
     study: Literal["realism", "constraints", "launch_end", "robots"] | None = None
     sweep: bool = False
+    max_height: bool = False
     report: Path | None = None
     view: bool = False
     results: Path | None = None
@@ -96,13 +101,13 @@ class EvalOptions:
         check_count("jobs", self.jobs, 1, unit="processes")
         chosen = [mode for mode in _MODES if getattr(self, mode)]
         if len(chosen) > 1:
-            raise ConfigError(chosen[0], getattr(self, chosen[0]), f"not with --{chosen[1]}")
+            raise ConfigError(chosen[0], getattr(self, chosen[0]), f"not with {_flag(chosen[1])}")
         if self.compare is not None and len(self.compare) < 2:
             raise ConfigError("compare", self.compare, "two or more policies")
         several_heights = isinstance(self.config.jump_height, tuple)
         if several_heights and self.mode not in ("statistics", "compare"):
             raise ConfigError(
-                "jump_height", self.config.jump_height, f"one height with --{self.mode}"
+                "jump_height", self.config.jump_height, f"one height with {_flag(self.mode)}"
             )
         outputs = [
             path.resolve()
@@ -115,13 +120,14 @@ class EvalOptions:
         for option in dataclasses.fields(self):
             value = getattr(self, option.name)
             if option.name not in used and value != option.default:
-                where = f"--{self.mode}" if chosen else "a single jump that nothing randomises"
+                where = _flag(self.mode) if chosen else "a single jump that nothing randomises"
                 shown = str(value) if isinstance(value, Path) else value
                 raise ConfigError(option.name, shown, f"not with {where}")
         for name in _CHOSEN_BY_MODE.get(self.mode, ()):
             value = self.config.value_of(name)
             if value != JumpConfig().value_of(name):
-                raise ConfigError(name, value, f"not with --{self.mode}, which varies it itself")
+                allowed = f"not with {_flag(self.mode)}, which varies it itself"
+                raise ConfigError(name, value, allowed)
 
     @property
     def seeds(self) -> range:
@@ -139,3 +145,7 @@ class EvalOptions:
             self.config.jump_height, tuple
         )
         return "statistics" if several or drawn else "nominal"
+
+
+def _flag(mode: str) -> str:
+    return f"--{mode.replace('_', '-')}"

@@ -12,22 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.errors import PlanningError
+from icub_jump_env.planning.whole_body.binding import binding
 from icub_jump_env.planning.whole_body.family import FORMAT, PlanFamily, model_hash
 from icub_jump_env.planning.whole_body.landing import LandingProgram
 from icub_jump_env.planning.whole_body.launch import Launch, LaunchProgram
 from icub_jump_env.planning.whole_body.margins import Branch, FamilyMargins
-from icub_jump_env.planning.whole_body.sagittal import (
-    COORDINATES,
-    SagittalModel,
-    coordinates,
-    selection,
-)
+from icub_jump_env.planning.whole_body.optimum import physical_optimum
+from icub_jump_env.planning.whole_body.sagittal import SagittalModel, selection
 from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
-
-_BINDS = 0.995
-"""Share of a limit from which on it binds."""
 
 
 def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanFamily:
@@ -52,10 +46,11 @@ def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanF
         "model": model_hash(robot),
         "margins": dataclasses.asdict(margins),
         "versions": {name: version(name) for name in ("casadi", "numpy", "pin")},
+        "optimum": physical_optimum(robot),
         "plans": [
             {
                 "height": round(launch.rise, 6),
-                "binding": binding(model, launch, margins.branches[index]),
+                "binding": binding(model, launch, margins.branches[index].launch),
                 "iterations": launch.iterations,
                 "violation": launch.violation,
             }
@@ -111,30 +106,3 @@ def _heights(lowest: float, highest: float, step: float) -> Iterator[float]:
             return
         if height < highest - step / 4:
             yield height
-
-
-def binding(model: SagittalModel, launch: Launch, branch: Branch) -> list[str]:
-    """What is at its limit somewhere along a launch, in words."""
-    robot, margins = model.robot, branch.launch
-    names = [name.replace("_", " ") for name in COORDINATES]
-    speed = np.abs(launch.v) / (margins.speed * coordinates(robot, robot.velocity_limit))
-    torque = np.abs(launch.outputs["torque"]) / (
-        margins.torque * coordinates(robot, robot.effort_limit)
-    )
-    found = [
-        f"{name} {quantity}"
-        for quantity, share in (("speed", speed), ("torque", torque))
-        for name, reached in zip(names, share.max(axis=0), strict=True)
-        if reached > _BINDS
-    ]
-    up = launch.outputs["force"][:, 1]
-    cop = -launch.outputs["moment"][:, 0] / up
-    sole, edge = robot.sole, margins.cop + 1e-3
-    if cop.min() < sole.x_min + edge:
-        found.append("centre of pressure at the heels")
-    if cop.max() > sole.x_max - edge:
-        found.append("centre of pressure at the toes")
-    friction = np.abs(launch.outputs["force"][:, 0]) / up
-    if friction.max() > _BINDS * margins.friction:
-        found.append("friction")
-    return found

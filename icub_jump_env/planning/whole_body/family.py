@@ -79,6 +79,11 @@ class PlanFamily:
         """Highest command (m)."""
         return float(self.rise[-1])
 
+    @property
+    def optimum(self) -> float:
+        """Rise (m) of the highest launch within the robot's limits: no margins, no controller."""
+        return float(self.card["optimum"]["height"])
+
     def check_height(self, jump_height: float) -> None:
         """Refuse a command that no plan reaches.
 
@@ -216,10 +221,18 @@ def _check(file: Path, family: PlanFamily) -> None:
     plans = family.card.get("plans")
     if not isinstance(plans, list) or len(plans) != shape[0]:
         raise PlanFileError(f"{file}: a card of other plans")
-    for plan in plans:
-        binding = plan.get("binding") if isinstance(plan, dict) else None
-        if not isinstance(binding, list) or not all(isinstance(word, str) for word in binding):
+    for plan in (*plans, family.card.get("optimum")):
+        if not isinstance(plan, dict) or not _says_what_binds(plan.get("binding")):
             raise PlanFileError(f"{file}: a card that does not say what binds")
+        if not isinstance(plan.get("height"), float) or not plan["height"] > 0:
+            raise PlanFileError(f"{file}: a card that does not say how high its plans go")
+
+
+def _says_what_binds(binding: Any) -> bool:
+    return isinstance(binding, dict) and all(
+        isinstance(times, list) and [type(time) for time in times] == [float, float]
+        for times in binding.values()
+    )
 
 
 def family_of(robot: Robot, controller: str, path: Path | None = None) -> PlanFamily:
