@@ -92,16 +92,12 @@ class HeightNotReachableError(ConfigError):
     """No plan of the robot reaches the commanded height."""
 
 
-class PlanFileError(ICubJumpError, ValueError):
-    """A file of plans is missing, damaged, or of another robot or controller."""
-
-
 class MissingDependencyError(ICubJumpError, RuntimeError):
     """An optional package or a system library is missing; the message names the remedy."""
 
 
-class PolicyFileError(ICubJumpError, ValueError):
-    """A file of a policy or a checkpoint is missing, damaged, or something else.
+class FileError(ICubJumpError, ValueError):
+    """A file is missing, damaged, or something else.
 
     Attributes:
         path: The file.
@@ -113,8 +109,16 @@ class PolicyFileError(ICubJumpError, ValueError):
         self.path = path
         self.problem = problem
 
-    def __reduce__(self) -> tuple[type[PolicyFileError], tuple[str, str]]:
+    def __reduce__(self) -> tuple[type[FileError], tuple[str, str]]:
         return type(self), (self.path, self.problem)
+
+
+class PolicyFileError(FileError):
+    """A file of a policy or a checkpoint."""
+
+
+class PlanFileError(FileError):
+    """A file of plans; also if they are of another robot or controller."""
 
 
 class PolicyMismatchError(ICubJumpError, ValueError):

@@ -25,7 +25,7 @@ LAYERS = (
     ("estimation", "planning", "metrics"),
     ("robot",),
     ("mappings",),
-    ("checks", "files"),
+    ("checks", "files", "carded"),
     ("errors",),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -163,7 +163,7 @@ class TestFiles:
             (lambda path: path.unlink(), "no such file"),
             (lambda path: path.write_bytes(path.read_bytes()[:-9] + b"123456789"), "damaged"),
             (lambda path: path.with_suffix(".json").write_text("{"), "not readable as JSON"),
-            (lambda path: path.with_suffix(".json").write_text("{}"), "not a card"),
+            (lambda path: path.with_suffix(".json").write_text("{}"), "damaged"),
         ],
     )
     def test_damaged_files_are_told(self, tmp_path, damage, match):

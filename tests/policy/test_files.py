@@ -14,9 +14,10 @@ import pytest
 from safetensors.numpy import save
 
 from icub_jump_env import files as package_files
+from icub_jump_env.carded import MAX_CARD_SIZE
 from icub_jump_env.errors import ICubJumpError, PolicyFileError
 from icub_jump_env.files import MAX_DEPTH
-from icub_jump_env.policy.files import MAX_CARD_SIZE, load_tensors, save_tensors
+from icub_jump_env.policy.files import load_tensors, save_tensors
 
 TENSORS = {
     "weights": np.arange(6, dtype=np.float32).reshape(2, 3),

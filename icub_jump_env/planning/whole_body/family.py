@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.carded import read_carded, write_carded
 from icub_jump_env.errors import HeightNotReachableError, PlanFileError
-from icub_jump_env.files import read_json, strict_json, write_files
 from icub_jump_env.planning.whole_body.plan import JointKnots, WholeBodyPlan
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot
@@ -152,10 +152,7 @@ class PlanFamily:
         """
         buffer = io.BytesIO()
         np.savez_compressed(buffer, **{name: getattr(self, name) for name in _DIMENSIONS})
-        content = buffer.getvalue()
-        card = {**self.card, "sha256": hashlib.sha256(content).hexdigest()}
-        text = strict_json(card, indent=2) + "\n"
-        write_files({path.with_suffix(".npz"): content, path.with_suffix(".json"): text.encode()})
+        write_carded(path.with_suffix(".npz"), buffer.getvalue(), self.card, PlanFileError)
 
 
 def load_family(path: Path) -> PlanFamily:
@@ -167,37 +164,24 @@ def load_family(path: Path) -> PlanFamily:
     Raises:
         PlanFileError: If a file is missing or damaged, or they do not belong together.
     """
-    arrays_file, card_file = path.with_suffix(".npz"), path.with_suffix(".json")
-    for file in (arrays_file, card_file):
-        if not file.is_file():
-            raise PlanFileError(
-                f"{file}: no such file; python -m icub_jump_env.planning makes one"
-            )
-        if file.stat().st_size > MAX_SIZE:
-            raise PlanFileError(f"{file}: larger than {MAX_SIZE} bytes")
-    content = arrays_file.read_bytes()
-    try:
-        card = read_json(card_file.read_bytes())
-    except ValueError as error:
-        raise PlanFileError(f"{card_file}: not readable as JSON ({error})") from None
-    if not isinstance(card, dict) or card.get("format") != FORMAT:
-        raise PlanFileError(f"{card_file}: not a card of format {FORMAT}")
-    if card.get("sha256") != hashlib.sha256(content).hexdigest():
-        raise PlanFileError(f"{arrays_file}: damaged, or not the file that the card is of")
+    file = path.with_suffix(".npz")
+    content, card = read_carded(file, MAX_SIZE, PlanFileError)
+    if card.get("format") != FORMAT:
+        raise PlanFileError(str(file), f"its card is not of format {FORMAT}")
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             values = {name: arrays[name] for name in _DIMENSIONS}
     except (KeyError, ValueError, OSError) as error:
-        raise PlanFileError(f"{arrays_file}: not a family of plans ({error})") from None
+        raise PlanFileError(str(file), f"not a family of plans ({error})") from None
     for name, dimensions in _DIMENSIONS.items():
         value = values[name]
         if value.ndim != dimensions or len(value) != len(values["rise"]):
-            raise PlanFileError(f"{arrays_file}: {name} has the shape {value.shape}")
+            raise PlanFileError(str(file), f"{name} has the shape {value.shape}")
         if not np.isfinite(value).all():
-            raise PlanFileError(f"{arrays_file}: {name} is not finite")
+            raise PlanFileError(str(file), f"{name} is not finite")
         value.setflags(write=False)
     family = PlanFamily(**values, card=card)
-    _check(arrays_file, family)
+    _check(file, family)
     return family
 
 
@@ -209,23 +193,23 @@ def _check(file: Path, family: PlanFamily) -> None:
     """
     shape = family.position.shape
     if not (family.velocity.shape == family.acceleration.shape == shape and shape[1] > 1):
-        raise PlanFileError(f"{file}: joint trajectories of different shapes")
+        raise PlanFileError(str(file), "joint trajectories of different shapes")
     if family.landing.shape[1] != shape[2]:
-        raise PlanFileError(f"{file}: a landing posture of other joints")
+        raise PlanFileError(str(file), "a landing posture of other joints")
     steps, new = np.diff(family.rise), np.diff(family.branch) != 0
     members = np.unique(family.branch, return_counts=True)[1]
     if not members.size or members.min() < 2 or (steps[~new] <= 0).any():
-        raise PlanFileError(f"{file}: each branch needs two plans or more, in ascending order")
+        raise PlanFileError(str(file), "each branch needs two plans or more, in ascending order")
     if not (family.duration > 0).all() or not (family.retraction > 0).all():
-        raise PlanFileError(f"{file}: durations that are not positive")
+        raise PlanFileError(str(file), "durations that are not positive")
     plans = family.card.get("plans")
     if not isinstance(plans, list) or len(plans) != shape[0]:
-        raise PlanFileError(f"{file}: a card of other plans")
+        raise PlanFileError(str(file), "a card of other plans")
     for plan in (*plans, family.card.get("optimum")):
         if not isinstance(plan, dict) or not _says_what_binds(plan.get("binding")):
-            raise PlanFileError(f"{file}: a card that does not say what binds")
+            raise PlanFileError(str(file), "a card that does not say what binds")
         if not isinstance(plan.get("height"), float) or not plan["height"] > 0:
-            raise PlanFileError(f"{file}: a card that does not say how high its plans go")
+            raise PlanFileError(str(file), "a card that does not say how high its plans go")
 
 
 def _says_what_binds(binding: Any) -> bool:
@@ -254,14 +238,18 @@ def family_of(robot: Robot, controller: str, path: Path | None = None) -> PlanFa
 @functools.lru_cache(maxsize=16)
 def _family_of(robot: Robot, controller: str, file: Path, written: int | None) -> PlanFamily:
     """The family in a file, read once for each time that it is written."""
+    if written is None:
+        raise PlanFileError(str(file), "no such file; python -m icub_jump_env.planning makes one")
     family = load_family(file)
     if family.position.shape[2] != robot.n_joints:
-        raise PlanFileError(f"{file}: trajectories of other joints")
+        raise PlanFileError(str(file), "trajectories of other joints")
     for name, ours in (
         ("robot", robot.name), ("controller", controller), ("model", model_hash(robot)),
     ):  # fmt: skip
         if family.card.get(name) != ours:
-            raise PlanFileError(f"{file}: {name} is {family.card.get(name)!r} instead of {ours!r}")
+            raise PlanFileError(
+                str(file), f"{name} is {family.card.get(name)!r} instead of {ours!r}"
+            )
     return family
 
 
