@@ -13,7 +13,7 @@ from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.episodes.series import perturbed
 from icub_jump_env.planning.whole_body.family import ARRAYS, PlanFamily
 
-REPETITIONS = 5
+REPETITIONS = 3
 """Jumps with each plan, link masses within 0.1 %; seeds from 0, which are for tuning."""
 
 

@@ -21,7 +21,7 @@ from icub_jump_env.checks import check_choice
 from icub_jump_env.control.config import CONTROLLERS, ControllerName
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation.cli import guarded, parse
-from icub_jump_env.planning.whole_body.margins import FamilyMargins
+from icub_jump_env.planning.whole_body.margins import MARGINS
 from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.robot.urdf import DEFAULT_MODEL
 
@@ -54,7 +54,9 @@ def make_plans(options: PlanningOptions) -> None:
     from icub_jump_env.planning.whole_body.build import build_family
 
     began = time.perf_counter()
-    family = build_family(load_robot(options.robot), options.controller, FamilyMargins())
+    family = build_family(
+        load_robot(options.robot), options.controller, MARGINS[options.controller]
+    )
     optimised = time.perf_counter()
     family = calibrate(family)
     done = time.perf_counter()

@@ -6,9 +6,10 @@ import pytest
 
 from experiments.collision_shapes import hulls
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.planning.whole_body.family import family_of
-from icub_jump_env.planning.whole_body.margins import BRANCHES
+from icub_jump_env.planning.whole_body.margins import MARGINS, LandingMargins, LaunchMargins
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
@@ -17,7 +18,11 @@ from icub_jump_env.robot.urdf import model_path
 
 pytest.importorskip("casadi")
 
-from icub_jump_env.planning.whole_body.launch import LaunchProgram
+from icub_jump_env.planning.whole_body.launch import (
+    LaunchProgram,
+    largest_speeds,
+    largest_torques,
+)
 from icub_jump_env.planning.whole_body.sagittal import (
     COORDINATES,
     SagittalModel,
@@ -27,12 +32,31 @@ from icub_jump_env.planning.whole_body.sagittal import (
 )
 
 ROBOT = load_robot()
-FAMILY = family_of(ROBOT, "velocity")
+FAMILIES = {name: family_of(ROBOT, name) for name in MARGINS}
+FAMILY = FAMILIES["velocity"]
+MEMBERS = [
+    (name, member) for name, family in FAMILIES.items() for member in range(len(family.rise))
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "message"),
+    [
+        (LaunchMargins, {"torque": 1.01}, "torque=1.01 .* 0.05 to 1 of the limit"),
+        (LaunchMargins, {"duration": (0.5, 0.2)}, "duration=.* the lower bound first"),
+        (LaunchMargins, {"friction": "rubber"}, "friction='rubber'"),
+        (LandingMargins, {"chest": 0.1}, "chest=0.1 .* 2 numbers .* rad"),
+        (LandingMargins, {"posture": (1.0, 2.0)}, "posture=.* 6 numbers"),
+    ],
+)
+def test_margins_are_validated(kind, changes, message):
+    with pytest.raises(ConfigError, match=message):
+        kind(**changes)
 
 
 @pytest.fixture(scope="module")
 def model():
-    return SagittalModel(ROBOT, BRANCHES[0].launch.shoulder_roll)
+    return SagittalModel(ROBOT, MARGINS["velocity"].shoulder_roll)
 
 
 def values(model, q, v, a):
@@ -123,15 +147,16 @@ def data_of_upright(kinematics, model):
     return data.oMf[kinematics.model.getFrameId(ROBOT.chest_link)].rotation.copy()
 
 
-@pytest.mark.parametrize("member", range(len(FAMILY.rise)))
-def test_shipped_plans_keep_their_margins(model, member):
-    margins = BRANCHES[FAMILY.branch[member]].launch
-    speed = margins.speed * coordinates(ROBOT, ROBOT.velocity_limit)
-    torque = margins.torque * coordinates(ROBOT, ROBOT.effort_limit)
+@pytest.mark.parametrize(("name", "member"), MEMBERS)
+def test_shipped_plans_keep_their_margins(model, name, member):
+    family = FAMILIES[name]
+    margins = MARGINS[name].branches[family.branch[member]].launch
+    speed = np.array(largest_speeds(ROBOT, margins))
+    torque = np.array(largest_torques(ROBOT, margins))
     close = 1 + 1e-4
     sole = ROBOT.sole
     for s, s_dot, s_ddot in zip(
-        FAMILY.position[member], FAMILY.velocity[member], FAMILY.acceleration[member], strict=True
+        family.position[member], family.velocity[member], family.acceleration[member], strict=True
     ):
         q, v, a = (coordinates(ROBOT, x) for x in (s, s_dot, s_ddot))
         found = values(model, q, v, a)
@@ -147,20 +172,20 @@ def test_shipped_plans_keep_their_margins(model, member):
 
 
 def test_a_search_finds_the_shipped_plan_again(model):
-    branch = BRANCHES[0]
+    branch = MARGINS["velocity"].branches[0]
     program = LaunchProgram(model, branch.launch)
     highest = program.highest(*branch.starts[0])
     assert highest.feasible
     assert highest.rise > branch.highest
     # As the family was made: from the top down, each search starting at the plan above.
     launch = highest
-    for height in (0.06, 0.055):
+    for height in (0.06, 0.05):
         launch = program.to_height(height, launch, highest.q[0])
         assert launch.feasible
-    assert launch.rise == pytest.approx(0.055, abs=1e-6)
+    assert launch.rise == pytest.approx(0.05, abs=1e-6)
     heights = [plan["height"] for plan in FAMILY.card["plans"]]
     np.testing.assert_allclose(
-        model.posture(launch.q), FAMILY.position[heights.index(0.055)], atol=1e-4
+        model.posture(launch.q), FAMILY.position[heights.index(0.05)], atol=1e-4
     )
 
 
@@ -197,11 +222,11 @@ def mesh_hulls():
 
 def test_no_link_meets_another_in_the_plans(mesh_hulls):
     """Along the launch and the way to the landing posture."""
-    for member in range(0, len(FAMILY.rise), 3):
-        launch, landing = FAMILY.position[member], FAMILY.landing[member]
+    for name, member in MEMBERS[::3] + [MEMBERS[-1], MEMBERS[len(FAMILY.rise) - 1]]:
+        launch, landing = FAMILIES[name].position[member], FAMILIES[name].landing[member]
         way = [launch[-1] + share * (landing - launch[-1]) for share in (0.3, 0.6, 1.0)]
         for posture in (*launch[::6], *way):
-            assert not mesh_hulls.meeting(posture), (member, np.degrees(posture))
+            assert not mesh_hulls.meeting(posture), (name, member, np.degrees(posture))
 
 
 @pytest.mark.parametrize("controller", ["velocity", "torque"])

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.planning.whole_body.launch import Launch
+from icub_jump_env.planning.whole_body.launch import Launch, largest_speeds, largest_torques
 from icub_jump_env.planning.whole_body.margins import LaunchMargins
-from icub_jump_env.planning.whole_body.sagittal import COORDINATES, SagittalModel, coordinates
+from icub_jump_env.planning.whole_body.sagittal import COORDINATES, SagittalModel
 
 _BINDS = 0.995
 """Share of a limit from which on it binds."""
@@ -39,11 +39,9 @@ def _limits(
 ) -> Iterator[tuple[str, NDArray[np.bool_]]]:
     """Each limit, and at which knots it is reached."""
     robot, sole = model.robot, model.robot.sole
-    speed = margins.speed * coordinates(robot, robot.velocity_limit)
-    torque = margins.torque * coordinates(robot, robot.effort_limit)
     for quantity, values, limits in (
-        ("speed", launch.v, speed),
-        ("torque", launch.outputs["torque"], torque),
+        ("speed", launch.v, largest_speeds(robot, margins)),
+        ("torque", launch.outputs["torque"], largest_torques(robot, margins)),
     ):
         for j, name in enumerate(COORDINATES):
             yield f"{name.replace('_', ' ')} {quantity}", np.abs(values[:, j]) > _BINDS * limits[j]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
+import math
 from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any
@@ -16,9 +18,10 @@ from icub_jump_env.planning.whole_body.binding import binding
 from icub_jump_env.planning.whole_body.family import FORMAT, PlanFamily, model_hash
 from icub_jump_env.planning.whole_body.landing import LandingProgram
 from icub_jump_env.planning.whole_body.launch import Launch, LaunchProgram
-from icub_jump_env.planning.whole_body.margins import Branch, FamilyMargins
+from icub_jump_env.planning.whole_body.margins import RETRACTION_SHARE, Branch, FamilyMargins
 from icub_jump_env.planning.whole_body.optimum import physical_optimum
 from icub_jump_env.planning.whole_body.sagittal import SagittalModel, selection
+from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -33,11 +36,14 @@ def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanF
     Raises:
         PlanningError: If a branch has no plan.
     """
-    plans = [
-        (index, model, launch, landing)
+    model = SagittalModel(robot, margins.shoulder_roll)
+    program = LaunchProgram(model, margins.branches[0].launch)
+    launches = [
+        (index, launch)
         for index, branch in enumerate(margins.branches)
-        for model, launch, landing in _branch(robot, branch, margins)
+        for launch in _branch(program, branch)
     ]
+    landings = [_landing(model, margins.branches[index], launch) for index, launch in launches]
     S = selection(robot)
     card: dict[str, Any] = {
         "format": FORMAT,
@@ -46,7 +52,7 @@ def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanF
         "model": model_hash(robot),
         "margins": dataclasses.asdict(margins),
         "versions": {name: version(name) for name in ("casadi", "numpy", "pin")},
-        "optimum": physical_optimum(robot),
+        "optimum": physical_optimum(program),
         "plans": [
             {
                 "height": round(launch.rise, 6),
@@ -54,55 +60,64 @@ def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanF
                 "iterations": launch.iterations,
                 "violation": launch.violation,
             }
-            for index, model, launch, _ in plans
+            for index, launch in launches
         ],
     }
     return PlanFamily(
-        rise=np.array([launch.rise for _, _, launch, _ in plans]),
-        branch=np.array([index for index, *_ in plans]),
-        duration=np.array([launch.duration for _, _, launch, _ in plans]),
-        position=np.array([model.posture(launch.q) for _, model, launch, _ in plans]),
-        velocity=np.array([launch.v @ S.T for _, _, launch, _ in plans]),
-        acceleration=np.array([launch.a @ S.T for _, _, launch, _ in plans]),
-        landing=np.array([model.posture(landing) for _, model, _, landing in plans]),
-        retraction=np.full(len(plans), margins.landing.retraction),
+        rise=np.array([launch.rise for _, launch in launches]),
+        branch=np.array([index for index, _ in launches]),
+        duration=np.array([launch.duration for _, launch in launches]),
+        position=np.array([model.posture(launch.q) for _, launch in launches]),
+        velocity=np.array([launch.v @ S.T for _, launch in launches]),
+        acceleration=np.array([launch.a @ S.T for _, launch in launches]),
+        landing=np.array([posture for posture, _ in landings]),
+        retraction=np.array([duration for _, duration in landings]),
         card=card,
     )
 
 
-def _branch(
-    robot: Robot, branch: Branch, margins: FamilyMargins
-) -> Iterator[tuple[SagittalModel, Launch, Array]]:
-    """The plans of a branch, from low to high."""
-    model = SagittalModel(robot, branch.launch.shoulder_roll)
-    program = LaunchProgram(model, branch.launch)
-    landing = LandingProgram(model, margins.landing)
+def _branch(program: LaunchProgram, branch: Branch) -> list[Launch]:
+    """The launches of a branch, from low to high."""
+    robot = program.model.robot
+    program.keep(branch.launch)
     found = [program.highest(crouch, takeoff) for crouch, takeoff in branch.starts]
     highest = max((launch for launch in found if launch.feasible), key=_rise, default=None)
     if highest is None:
         raise PlanningError(f"no launch of {robot.name} keeps the limits")
-    launches = [highest] if highest.rise <= branch.highest else []
-    near, top = highest, min(highest.rise, branch.highest + margins.step)
+    launches = [highest]
     # Each search starts at the plan above, so that the family is smooth.
-    for height in _heights(branch.lowest, top, margins.step):
-        near = program.to_height(height, near, highest.q[0])
-        if not near.feasible:
+    for height in _heights(branch, highest.rise):
+        launches.append(program.to_height(height, launches[-1], highest.q[0]))
+        if not launches[-1].feasible:
             raise PlanningError(f"no launch of {robot.name} to {100 * height:.1f} cm was found")
-        launches.append(near)
-    for launch in reversed(launches):
-        yield model, launch, landing.solve(launch)
+    return [launch for launch in reversed(launches) if launch.rise < branch.highest + 1e-4]
+
+
+def _landing(model: SagittalModel, branch: Branch, launch: Launch) -> tuple[Array, float]:
+    """The posture of flight and landing ((n,) rad), and the duration of the motion to it (s)."""
+    if branch.landing is not None:
+        program = _landing_program(model, branch.landing)
+        return model.posture(program.solve(launch)), branch.landing.retraction
+    flight = 2 * math.sqrt(2 * launch.rise / GRAVITY)
+    return model.robot.landing, RETRACTION_SHARE * flight
+
+
+_landing_program = functools.lru_cache(LandingProgram)
 
 
 def _rise(launch: Launch) -> float:
     return launch.rise
 
 
-def _heights(lowest: float, highest: float, step: float) -> Iterator[float]:
-    """Multiples of the step between two heights, from high to low, and the lowest."""
-    for k in itertools.count(int(highest / step), -1):
+def _heights(branch: Branch, reached: float) -> Iterator[float]:
+    """From what is reached down: the highest of a branch, multiples of the step, the lowest."""
+    step, top = branch.step, min(reached, branch.highest)
+    if top < reached:
+        yield top
+    for k in itertools.count(int(top / step), -1):
         height = k * step
-        if height <= lowest + step / 4:
-            yield lowest
+        if height <= branch.lowest + step / 4:
+            yield branch.lowest
             return
-        if height < highest - step / 4:
+        if height < top - step / 4:
             yield height

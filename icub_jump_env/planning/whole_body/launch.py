@@ -6,9 +6,11 @@ positions are cubic, and all limits hold at the knots.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -28,6 +30,7 @@ from icub_jump_env.planning.whole_body.sagittal import (
     stopping_inertia,
 )
 from icub_jump_env.robot.icub import GRAVITY
+from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -80,19 +83,44 @@ class Launch:
         return self.violation < FEASIBLE
 
 
+def largest_speeds(robot: Robot, margins: Any) -> list[Any]:
+    """Of the six coordinates (rad/s), by :class:`LaunchMargins` or their symbols."""
+    shares = [margins.speed] * len(COORDINATES)
+    shares[TORSO] = margins.torso_speed
+    limits = coordinates(robot, robot.velocity_limit)
+    return [share * limit for share, limit in zip(shares, limits, strict=True)]
+
+
+def largest_torques(robot: Robot, margins: Any) -> list[Any]:
+    """Of one motor of each coordinate (Nm), likewise."""
+    return [margins.torque * limit for limit in coordinates(robot, robot.effort_limit)]
+
+
 class LaunchProgram:
-    """The program of one robot; height and preferred crouch are its parameters."""
+    """The program of one robot; margins, height and preferred crouch are its parameters.
+
+    To pose it takes ten times as long as to solve it, so it serves all branches of a family.
+
+    Attributes:
+        model: The robot in its sagittal plane.
+    """
 
     def __init__(self, model: SagittalModel, margins: LaunchMargins) -> None:
         """Pose the program.
 
         Args:
             model: The robot in its sagittal plane.
-            margins: Limits and costs.
+            margins: Limits and costs, until :meth:`keep` sets others.
         """
-        self._model, self._margins = model, margins
+        self.model = model
         n = len(COORDINATES)
         opti = self._opti = ca.Opti()
+        self._margins = SimpleNamespace(
+            **{
+                name: opti.parameter(np.size(value))
+                for name, value in dataclasses.asdict(margins).items()
+            }
+        )
         self._Q, self._V, self._A = (opti.variable(n, KNOTS) for _ in range(3))
         self._T = opti.variable()
         self._crouch = opti.parameter(n)
@@ -100,9 +128,8 @@ class LaunchProgram:
         self._rise_weight = opti.parameter()
         results = model.dynamics.map(KNOTS)(self._Q, self._V, self._A * _ACCELERATION)
         self._at = dict(zip(model.dynamics.name_out(), results, strict=True))
-        robot = model.robot
-        self._speed = margins.speed * coordinates(robot, robot.velocity_limit)
-        self._torque = margins.torque * coordinates(robot, robot.effort_limit)
+        self._speed = ca.vertcat(*largest_speeds(model.robot, self._margins))
+        self._torque = ca.vertcat(*largest_torques(model.robot, self._margins))
         self._transcribe()
         self._limit_joints()
         self._limit_contact()
@@ -112,6 +139,12 @@ class LaunchProgram:
         rise = takeoff**2 / (2 * GRAVITY)
         opti.minimize(self._cost() - self._rise_weight * rise)
         opti.solver("ipopt", {"expand": True, "print_time": False}, _IPOPT)
+        self.keep(margins)
+
+    def keep(self, margins: LaunchMargins) -> None:
+        """Search with these limits and costs from now on."""
+        for name, value in dataclasses.asdict(margins).items():
+            self._opti.set_value(getattr(self._margins, name), value)
 
     def _between(self, low: Any, value: Any, high: Any) -> None:
         self._opti.subject_to(self._opti.bounded(low, value, high))
@@ -125,21 +158,22 @@ class LaunchProgram:
         # At rest, also statically: the torques of the first knot hold the crouch.
         opti.subject_to(V[:, 0] == 0)
         opti.subject_to(A[:, 0] == 0)
-        shortest, longest = self._margins.duration
-        self._between(shortest, self._T, longest)
+        duration = self._margins.duration
+        self._between(duration[0], self._T, duration[1])
 
     def _limit_joints(self) -> None:
-        margins, robot = self._margins, self._model.robot
+        margins, robot = self._margins, self.model.robot
         lower_stop, upper_stop = (
             coordinates(robot, limit) for limit in (robot.lower_position, robot.upper_position)
         )
-        lower, upper = lower_stop + margins.position, upper_stop - margins.position
-        lower[ANKLE] = max(lower_stop[ANKLE], margins.ankle[0])
-        upper[ANKLE] = min(upper_stop[ANKLE], margins.ankle[1])
-        upper[HIP] = min(upper[HIP], margins.hip)
-        lower[TORSO] = max(lower[TORSO], margins.torso[0])
-        upper[TORSO] = min(upper[TORSO], margins.torso[1])
-        lower[SHOULDER] = max(lower[SHOULDER], margins.shoulder)
+        lower = [stop + margins.position for stop in lower_stop]
+        upper = [stop - margins.position for stop in upper_stop]
+        lower[ANKLE] = ca.fmax(lower_stop[ANKLE], margins.ankle[0])
+        upper[ANKLE] = ca.fmin(upper_stop[ANKLE], margins.ankle[1])
+        upper[HIP] = ca.fmin(upper[HIP], margins.hip)
+        lower[TORSO] = ca.fmax(lower[TORSO], margins.torso[0])
+        upper[TORSO] = ca.fmin(upper[TORSO], margins.torso[1])
+        lower[SHOULDER] = ca.fmax(lower[SHOULDER], margins.shoulder)
         # After take-off each joint must come to rest before its stop, at full torque.
         braking = coordinates(robot, robot.effort_limit) / stopping_inertia(robot)
         for j in range(len(COORDINATES)):
@@ -148,13 +182,14 @@ class LaunchProgram:
             self._between(-1, ca.vec(self._at["torque"][j, :]) / self._torque[j], 1)
             v = self._V[j, -1]
             way = v * ca.sqrt(v**2 + 1e-4) / (2 * braking[j])
-            self._between(lower_stop[j], self._Q[j, -1] + way, upper_stop[j])
+            end = self._Q[j, -1] + way
+            self._between(lower_stop[j] + margins.stop, end, upper_stop[j] - margins.stop)
 
     def _limit_contact(self) -> None:
-        opti, margins, sole = self._opti, self._margins, self._model.robot.sole
+        opti, margins, sole = self._opti, self._margins, self.model.robot.sole
         forward, up = (ca.vec(self._at["force"][i, :]) for i in range(2))
         moment = ca.vec(self._at["moment"])
-        weight = self._model.mass * GRAVITY
+        weight = self.model.mass * GRAVITY
         opti.subject_to(up / weight >= margins.least_load)
         opti.subject_to((margins.friction * up - forward) / weight >= 0)
         opti.subject_to((margins.friction * up + forward) / weight >= 0)
@@ -164,7 +199,7 @@ class LaunchProgram:
         opti.subject_to((toe * up + moment) / 10 >= 0)
 
     def _limit_shape(self) -> None:
-        opti, margins, sole = self._opti, self._margins, self._model.robot.sole
+        opti, margins, sole = self._opti, self._margins, self.model.robot.sole
         com, velocity = self._at["com"], self._at["com_velocity"]
         chest = chest_pitch(self._Q).T
         self._between(margins.chest[0], chest, margins.chest[1])
@@ -175,13 +210,13 @@ class LaunchProgram:
         opti.subject_to(com[1, -1] - com[1, 0] >= margins.displacement)
         opti.subject_to(velocity[0, -1] == margins.forward_speed)
         opti.subject_to(self._Q[HIP, -1] <= margins.takeoff_hip)
-        least, most = margins.momentum
-        self._between(least, self._at["momentum"][0, -1], most)
+        momentum = margins.momentum
+        self._between(momentum[0], self._at["momentum"][0, -1], momentum[1])
 
     def _cost(self) -> Any:
         margins = self._margins
-        torque = self._at["torque"] / ca.DM(self._torque)
-        speed = self._V / ca.DM(self._speed)
+        torque = self._at["torque"] / ca.repmat(self._torque, 1, KNOTS)
+        speed = self._V / ca.repmat(self._speed, 1, KNOTS)
         jerk = (self._A[:, 1:] - self._A[:, :-1]) * (KNOTS - 1)
         return (
             margins.torque_cost * ca.sumsqr(torque) / KNOTS

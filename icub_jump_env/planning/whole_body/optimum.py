@@ -9,15 +9,14 @@ from icub_jump_env.errors import PlanningError
 from icub_jump_env.planning.whole_body.binding import binding
 from icub_jump_env.planning.whole_body.launch import LaunchProgram
 from icub_jump_env.planning.whole_body.margins import LaunchMargins
-from icub_jump_env.planning.whole_body.sagittal import SagittalModel
 from icub_jump_env.robot.icub import FEET_FRICTION
-from icub_jump_env.robot.robot import Robot
 
 _ANY_ANGLE = (-math.pi, math.pi)
 
 PHYSICAL = LaunchMargins(
     torque=1.0,
     speed=1.0,
+    torso_speed=1.0,
     position=0.0,
     ankle=_ANY_ANGLE,
     hip=math.radians(80.0),
@@ -47,14 +46,17 @@ _START = tuple(
 finds the same."""
 
 
-def physical_optimum(robot: Robot) -> dict[str, Any]:
+def physical_optimum(program: LaunchProgram) -> dict[str, Any]:
     """The highest launch of a robot: its ``height`` (m), and what is ``binding``.
+
+    Args:
+        program: The program of the robot; its margins are other ones afterwards.
 
     Raises:
         PlanningError: If the search finds none.
     """
-    model = SagittalModel(robot, PHYSICAL.shoulder_roll)
-    launch = LaunchProgram(model, PHYSICAL).highest(*_START)
+    program.keep(PHYSICAL)
+    launch = program.highest(*_START)
     if not launch.feasible:
-        raise PlanningError(f"the physical optimum of {robot.name} was not found")
-    return {"height": round(launch.rise, 6), "binding": binding(model, launch, PHYSICAL)}
+        raise PlanningError(f"the physical optimum of {program.model.robot.name} was not found")
+    return {"height": round(launch.rise, 6), "binding": binding(program.model, launch, PHYSICAL)}
