@@ -50,7 +50,7 @@ def make_plans(options: PlanningOptions) -> None:
     if importlib.util.find_spec("casadi") is None:
         raise MissingDependencyError("making plans needs CasADi: install the extra 'planning'")
     from icub_jump_env.evaluation.calibration import calibrate
-    from icub_jump_env.evaluation.report.output import new_table, show
+    from icub_jump_env.evaluation.report.output import new_table, say, show
     from icub_jump_env.planning.whole_body.build import build_family
 
     began = time.perf_counter()
@@ -63,12 +63,14 @@ def make_plans(options: PlanningOptions) -> None:
     path = options.output or Path(f"{options.robot}-{options.controller}")
     path = path.with_suffix(".npz")
     family.save(path)
-    table = new_table(1, "plan, cm", "jump, cm", "at its limit")
+    table = new_table(0, "plan, cm", "jump, cm")
     for plan in family.card["plans"]:
-        table.add_row(
-            f"{100 * plan['height']:.2f}", f"{100 * plan['rise']:.2f}", ", ".join(plan["binding"])
-        )
-    show(Console(), table)
+        table.add_row(f"{100 * plan['height']:.2f}", f"{100 * plan['rise']:.2f}")
+    console = Console()
+    say(console, f"{options.robot}, {options.controller} controller")
+    show(console, table)
+    say(console, f"physical optimum: {100 * family.optimum:.2f} cm")
+    say(console, f"the highest plan is bound by {', '.join(family.card['plans'][-1]['binding'])}")
     print(f"wrote {path}", file=sys.stderr)
     print(
         f"optimised in {optimised - began:.0f} s, jumped in {done - optimised:.0f} s",

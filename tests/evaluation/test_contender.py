@@ -1,6 +1,7 @@
 """``eval.py --policy``: who jumps, in which environment, and what is refused."""
 
 import contextlib
+import dataclasses
 import io
 import json
 import shlex
@@ -420,3 +421,14 @@ def test_a_series_is_completed_from_its_log(monkeypatch, tmp_path):
         "icub_jump_env.evaluation.episodes.series.run_jobs", lambda work, jobs: run_jobs((), jobs)
     )
     assert series.complete(1, QUIET) == episodes
+
+
+def test_the_default_log_is_another_one_after_the_plans_have_changed(tmp_path):
+    config = JumpConfig.of(planner="whole_body")
+    family = config.plan_family
+    family.save(tmp_path / "mine.npz")
+    series = Series(config.replace(plans=tmp_path / "mine.npz"), range(2))
+    before = series.default_log()
+    assert before == series.default_log()
+    dataclasses.replace(family, retraction=family.retraction + 0.01).save(tmp_path / "mine.npz")
+    assert series.default_log() != before

@@ -35,10 +35,9 @@ def test_the_held_out_seeds_are_held_out():
         assert not set(PLANNER_TEST) & set(others)
 
 
-def test_the_paper_jump_is_among_the_cases_and_every_low_command_has_its_pair():
+def test_every_low_command_has_its_pair():
     for controller in ("velocity", "torque"):
         found = cases(controller)
-        assert ("scaled_curve", 0.04, 0.11) in found
         for height in planners.LOW:
             assert ("scaled_curve", height, planners.PAPER_DISPLACEMENT) in found
             assert ("whole_body", height, None) in found

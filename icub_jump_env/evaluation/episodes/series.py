@@ -18,7 +18,7 @@ from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.quantities import commands
 from icub_jump_env.evaluation.report.output import progress_display, say
-from icub_jump_env.evaluation.report.provenance import provenance, source, versions
+from icub_jump_env.evaluation.report.provenance import plans, provenance, source, versions
 from icub_jump_env.files import strict_json
 from icub_jump_env.simulation.randomization import Randomization
 from icub_jump_env.simulation.sensor_models import SensorConfig
@@ -105,6 +105,7 @@ class Series:
                 len(self.seeds),
                 self.contender.identity,
                 source(),
+                plans(self.config),
                 versions(),
             ]
         )

@@ -26,6 +26,7 @@ def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
     return {
         "versions": versions(),
         SOURCE: source(),
+        "plans": plans(config),
         "config": dataclasses.asdict(config),
         "seed": seed,
     }
@@ -41,6 +42,11 @@ def source() -> str:
         if not name.startswith("evaluation/"):
             digest.update(name.encode() + file.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def plans(config: JumpConfig) -> str | None:
+    """Hash of the whole-body plans; None where nothing follows any."""
+    return config.plan_family.card["sha256"] if config.planner == "whole_body" else None
 
 
 def versions(*more: str) -> dict[str, str]:

@@ -222,7 +222,7 @@ _STRETCH = Branch(
 """Hips and knees stretch, as one would."""
 
 _BOW = ((_degrees(-48, -112, 75, 40, -17, 46), _degrees(-17, -69, 52, 6, -35, 45)),)
-"""Where searches for a swing start: two other starts found nothing higher."""
+"""Where searches for a swing start; from two other starts they found the same."""
 
 _SWING = LaunchMargins(
     takeoff_hip=_deg(40.0), torso=(_deg(-17.0), _deg(60.0)), momentum=(-0.2, 0.1)
@@ -263,7 +263,7 @@ class FamilyMargins:
 _VELOCITY = FamilyMargins(
     (
         _STRETCH,
-        # Higher plans with these margins fall forward under randomisation.
+        # Higher plans with these margins fall more often under randomisation.
         Branch(
             0.06,
             0.0715,
@@ -271,7 +271,7 @@ _VELOCITY = FamilyMargins(
             _BOW,
             _UPRIGHT,
         ),
-        # At the full torque it lags behind and loses half a centimetre.
+        # With all of the torque the jump is 0.4 cm lower.
         Branch(
             0.0715,
             math.inf,
@@ -301,7 +301,8 @@ _TORQUE = FamilyMargins(
                 duration=(0.2, 0.6),
             ),
             _BOW,
-            _GENTLE,
+            # What falls here falls backward.
+            dataclasses.replace(_GENTLE, com_forward=0.01),
         ),
         Branch(
             0.07,
