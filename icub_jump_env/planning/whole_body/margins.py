@@ -243,9 +243,6 @@ _SLACK = dataclasses.replace(
 _UPRIGHT = LandingMargins(chest=(_deg(-2.0), _deg(23.0)))
 """After a swing: what is landed leans by less than 30 deg, and it rocks."""
 
-_GENTLE = dataclasses.replace(_UPRIGHT, retraction=0.165, speed=0.85, shoulder=_deg(-70.0))
-"""Weak motors keep up with it, and the arms do not run into their ends."""
-
 
 @dataclass(frozen=True)
 class FamilyMargins:
@@ -288,28 +285,26 @@ _TORQUE = FamilyMargins(
         # Weak motors overshoot: the torso its speed, ankles and arms their ends.
         Branch(
             0.06,
-            0.07,
+            0.066,
             dataclasses.replace(
                 _SWING,
-                torque=0.865,
-                speed=1.0,
-                torso_speed=0.78,
-                stop=0.2,
-                ankle=(_deg(-44.0), _deg(15.0)),
-                shoulder=-1.05,
-                forward_speed=0.135,
+                torso_speed=0.8,
+                stop=0.05,
+                ankle=(_deg(-46.0), _deg(15.0)),
+                shoulder=-1.1,
+                forward_speed=0.115,
+                momentum=(-0.1, 0.0),
                 duration=(0.2, 0.6),
             ),
             _BOW,
-            # What falls here falls backward.
-            dataclasses.replace(_GENTLE, com_forward=0.01),
+            LandingMargins(retraction=0.15, speed=0.9, shoulder=_deg(-72.0), com_height=0.485),
         ),
         Branch(
-            0.07,
+            0.066,
             math.inf,
             dataclasses.replace(_SLACK, torque=1.0, momentum=(-0.1, 0.0)),
             _BOW,
-            _GENTLE,
+            dataclasses.replace(_UPRIGHT, retraction=0.165, speed=0.85, shoulder=_deg(-70.0)),
         ),
     )
 )
