@@ -27,8 +27,9 @@ from icub_jump_env.checks import check_count
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
+from icub_jump_env.evaluation.episodes.parallel import Job, run_all
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.episodes.series import Series
+from icub_jump_env.evaluation.episodes.series import Series, perturbed
 from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, number, seeds, spread
 from icub_jump_env.evaluation.report.output import (
     check_writable,
@@ -56,6 +57,11 @@ HIGH: dict[ControllerName, tuple[float, ...]] = {
 }
 """Commands (m) of whole-body plans beyond. Of those tried, the middle ones are the highest that
 landed in at least 99 % of the tuning seeds under ``full``."""
+
+UNTUNED = (0.0213, 0.0247, 0.0271, 0.0333, 0.0367, 0.0445, 0.0481, 0.0533, 0.0567, 0.0597)
+"""Commands (m) between the plans, which are jumped in the nominal simulation."""
+
+_NOMINAL_JUMPS = 10
 
 _SCALED_CURVE = (
     *((height, PAPER_DISPLACEMENT) for height in LOW),
@@ -140,6 +146,7 @@ def run_planners(options: PlannerOptions) -> None:
         shown = [p for p in points if (p.controller, p.world) == (controller, world)]
         show(console, render(shown, f"{controller} controller, {world}, {seeds(used)}"))
     show(console, render_pairs(points))
+    show(console, render_nominal(options.jobs, progress))
 
 
 def cases(controller: ControllerName) -> list[tuple[PlannerName, float, float | None]]:
@@ -232,6 +239,36 @@ def render_pairs(points: Sequence[Point]) -> Table:
             f"{difference.p_value if p is None else p:.3f}",
         )
     table.caption = f"pairs of the same seed; p: McNemar, Holm-corrected over {len(pairs)}"
+    return table
+
+
+def render_nominal(jobs: int, progress: Console) -> Table:
+    """How far the nominal robot's rise is from commands between the plans."""
+    table = new_table(
+        1, "command, cm", *CONTROLLERS, "landed, %", title="Whole-body plans, nominal: rise, cm"
+    )
+    seeds_used = range(_NOMINAL_JUMPS)
+    configs = [
+        perturbed(JumpConfig.of(controller=name, planner="whole_body", jump_height=height))
+        for height in UNTUNED
+        for name in CONTROLLERS
+    ]
+    work = [Job(config, seed) for config in configs for seed in seeds_used]
+    episodes = run_all(work, jobs, progress)
+    errors = []
+    for i, height in enumerate(UNTUNED):
+        per_command = len(CONTROLLERS) * _NOMINAL_JUMPS
+        these = episodes[i * per_command : (i + 1) * per_command]
+        rises = np.reshape([e.jump["flight_height"] for e in these], (len(CONTROLLERS), -1))
+        medians = np.median(rises, axis=1)
+        errors += list(np.abs(medians - height))
+        landed = np.mean([e.jump["landed"] for e in these])
+        cells = (number(float(rise), "cm") for rise in medians)
+        table.add_row(f"{CM * height:.2f}", *cells, number(float(landed), "%"))
+    table.caption = (
+        f"medians of {_NOMINAL_JUMPS} jumps with link masses within 0.1 %; largest error "
+        f"{number(max(errors), 'cm')} cm"
+    )
     return table
 
 

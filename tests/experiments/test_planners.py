@@ -75,10 +75,16 @@ def test_the_command_prints_every_world_and_draws(monkeypatch, capsys, tmp_path)
         "cases",
         lambda _: [("scaled_curve", 0.04, 0.11), ("whole_body", 0.04, None)],
     )
+    monkeypatch.setattr(planners, "UNTUNED", (0.0437,))
+    monkeypatch.setattr(planners, "_NOMINAL_JUMPS", 2)
     run_planners(PlannerOptions(plot=tmp_path))
     out = capsys.readouterr().out
     for controller in ("velocity", "torque"):
         assert f"{controller} controller, full, seeds 0 to 1" in out
+    (row,) = re.findall(r"^ 4.37 +(\S+) +(\S+) +100 *$", out, re.M)
+    errors = [abs(float(rise) - 4.37) for rise in row]
+    assert max(errors) < 0.3
+    assert f"largest error {max(errors):.2f} cm" in " ".join(out.split())
     assert out.count("scaled_curve") == out.count("whole_body") == 2
     assert (tmp_path / "planners.png").read_bytes().startswith(b"\x89PNG")
 
@@ -94,5 +100,7 @@ def test_held_out_seeds_only_when_asked(judge, monkeypatch):
         )
 
     monkeypatch.setattr(planners, "jumps", jumps)
+    monkeypatch.setattr(planners, "UNTUNED", (0.05,))
+    monkeypatch.setattr(planners, "_NOMINAL_JUMPS", 1)
     run_planners(PlannerOptions(judge=judge))
     assert set(used) == {PLANNER_TEST if judge else TUNING}
