@@ -26,26 +26,24 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from torch.utils.tensorboard import SummaryWriter
 
-from icub_jump_env.checks import check_count, check_number, check_type
 from icub_jump_env.errors import ConfigError, PolicyFileError
-from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.quantities import CM, DEG, PERCENT, commands, number
 from icub_jump_env.evaluation.report.output import progress_display, say, write_json
 from icub_jump_env.evaluation.report.provenance import SOURCE, command, source, versions
-from icub_jump_env.evaluation.statistics.summary import Command, Summary, by_command, command_range
+from icub_jump_env.evaluation.statistics.summary import Command, command_range
 from icub_jump_env.files import read_json
 from icub_jump_env.policy import load_policy, save_policy
 from icub_jump_env.policy.fields import check_command
 
 from .checkpoints import (
     Checkpoint,
-    CheckpointError,
     begin_segment,
     load_latest,
     restore,
     save_checkpoint,
     segment_seeds,
 )
+from .curve import check_progress, curve_point, read_minutes
 from .environment import LaunchEnv, acting_steps
 from .options import COMMAND, OPTIONS, SELECTION, TrainOptions, read_options
 from .ppo import export, freeze_policy, make_model, set_noise
@@ -61,9 +59,6 @@ LAST = "last.safetensors"
 
 MOST_CHECKPOINTS = 500
 """Of a run; the learning curve is in each of them, whose size is limited."""
-
-_LARGEST_SCORE = 1e6
-"""No mean reward comes near it."""
 
 _PACKAGES = ("stable-baselines3", "torch")
 
@@ -240,8 +235,8 @@ class _Run(BaseCallback):
     def resume(self, number: int, progress: Mapping[str, Any]) -> None:
         """Take up what a checkpoint noted."""
         self._number, self._resumed = number, True
-        self._updates, self._curve = _check_progress(number, progress)
-        self._minutes = _read_minutes(self._options.folder / CURVE, len(self._curve))
+        self._updates, self._curve = check_progress(number, progress)
+        self._minutes = read_minutes(self._options.folder / CURVE, len(self._curve))
         seed, jobs = self._options.seed, self._options.jobs
         self._seeds = [segment_seeds(seed, earlier, jobs) for earlier in range(1, number)]
 
@@ -322,7 +317,7 @@ class _Run(BaseCallback):
     def _evaluate(self) -> None:
         policy = export(self.model, self._options, self._action_scale)
         episodes = self._env.evaluate(policy, SELECTION)
-        self._curve.append(_point(self.model.num_timesteps, episodes))
+        self._curve.append(curve_point(self.model.num_timesteps, episodes))
         now = time.monotonic()
         self._minutes.append(round((now - self._since) / 60, 3))
         self._since = now
@@ -362,49 +357,3 @@ class _Run(BaseCallback):
             seed=self._options.seed,
             results={"evaluation": self._curve[-1]},
         )
-
-
-def _check_progress(number: int, progress: Mapping[str, Any]) -> tuple[int, list[dict[str, Any]]]:
-    """Updates and learning curve, as a checkpoint noted them.
-
-    Raises:
-        CheckpointError: If it did not.
-    """
-    try:
-        updates = check_count("updates", progress.get("updates"), 0, unit="updates")
-        curve = progress.get("curve")
-        if not isinstance(curve, list) or len(curve) != number:
-            raise ConfigError("curve", curve, f"a list of {number} evaluations")
-        for point in curve:
-            check_type("point of the curve", point, dict)
-            check_number("score", point.get("score"), -_LARGEST_SCORE, _LARGEST_SCORE)
-    except ConfigError as error:
-        raise CheckpointError(f"checkpoint {number}: {error}") from None
-    return updates, curve
-
-
-def _read_minutes(file: Path, count: int) -> list[float | None]:
-    """What the first evaluations took; unknown if the file is gone, for it is a mere report."""
-    try:
-        minutes = read_json(file.read_bytes())["minutes"]
-        return [None if value is None else float(value) for value in minutes[:count]]
-    except (OSError, ValueError, TypeError, KeyError):
-        return [None] * count
-
-
-def _point(timesteps: int, episodes: Sequence[Episode]) -> dict[str, Any]:
-    """A point of the learning curve."""
-    summary = Summary.of(episodes)
-    return {
-        "timesteps": timesteps,
-        "episodes": len(episodes),
-        "score": float(np.mean([episode.reward for episode in episodes])),
-        "success": summary.success.share,
-        "landed": summary.landed.share,
-        "rise": summary.mean_rise,
-        "rotation": None if math.isnan(summary.median_rotation) else summary.median_rotation,
-        "success_by_command": {
-            commands(*bounds): Summary.of(group).success.share
-            for bounds, group in by_command(episodes).items()
-        },
-    }

@@ -19,15 +19,16 @@ from tiny_run import ARGUMENTS, SEEDS, children, results, train, written
 
 from agents import training
 from agents.checkpoints import CheckpointError, load_latest
+from agents.curve import check_progress
 from agents.environment import acting_steps
 from agents.options import read_options
 from agents.training import MOST_CHECKPOINTS
 from agents.vec_env import JumpVecEnv
+from icub_jump_env.carded import MAX_CARD_SIZE
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.statistics.summary import Summary
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import load_policy
-from icub_jump_env.policy.files import MAX_CARD_SIZE
 
 RUN = Path("run")
 
@@ -310,6 +311,6 @@ def test_the_longest_curve_fits_into_a_checkpoint():
 )
 def test_a_checkpoint_without_a_trainings_progress_is_refused(change, message):
     progress = {"updates": 4, "curve": [{"score": 1.0}, {"score": 2.0}]}
-    assert training._check_progress(2, progress) == (4, progress["curve"])
+    assert check_progress(2, progress) == (4, progress["curve"])
     with pytest.raises(CheckpointError, match=f"^checkpoint 2: .*{re.escape(message)}"):
-        training._check_progress(2, progress | change)
+        check_progress(2, progress | change)

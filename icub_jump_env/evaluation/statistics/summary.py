@@ -20,6 +20,7 @@ _METRICS = (
     "landing_force",
     "joint_work",
     "solver_failures",
+    "self_collisions",
 )
 
 
