@@ -67,7 +67,10 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
 
 
 def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
-    """Mean rise over the landing rate, a panel for each controller; labels name the command (cm)."""
+    """Mean rise over the landing rate, a panel for each controller; labels name the command (cm).
+
+    Commands below 5 cm, which all land, would hide each other.
+    """
     figure, (axes,) = panels((10.0, 4.6), columns=len(CONTROLLERS), sharey=True)
     colors = dict(zip(("scaled_curve", "whole_body"), (DESIRED, MEASURED), strict=True))
     fills = {"full": "full", "hard": "none"}
@@ -77,6 +80,7 @@ def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
                 p
                 for p in points
                 if (p.controller, p.planner, p.world) == (controller, planner, world)
+                and p.jump_height >= 0.05
             ]
             share = PERCENT * np.array([p.landed.share for p in shown])
             rise = CM * np.array([p.rises.mean() for p in shown])
@@ -86,15 +90,16 @@ def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
                 share, rise, np.abs(rises - rise), np.abs(shares - share), "o", color=color,
                 fillstyle=fill, elinewidth=0.7, ms=5, label=f"{planner}, {world}",
             )  # fmt: skip
-            for x, y, point in zip(share, rise, shown, strict=True):
-                left = fill == "none"
+            left = fill == "none"
+            for k, (x, y, point) in enumerate(zip(share, rise, shown, strict=True)):
+                # Neighbours in turn below and above.
                 axis.annotate(
                     f"{CM * point.jump_height:g}", (x, y), textcoords="offset points",
-                    xytext=(-5 if left else 5, 4), ha="right" if left else "left", fontsize=7,
-                    color=color,
+                    xytext=(-6 if left else 6, 4 if k % 2 else -10),
+                    ha="right" if left else "left", fontsize=8, color=color,
                 )  # fmt: skip
         axis.set_title(f"{controller} controller", fontsize=10)
-        axis.set(xlabel="landed (%)", xlim=(None, 103), ylim=(0, None))
+        axis.set(xlabel="landed (%)", xlim=(0, 107), ylim=(3, 8))
     axes[0].set_ylabel("mean CoM rise (cm)")
     axes[0].legend(frameon=False, loc="lower left", fontsize=8)
     return figure
