@@ -84,6 +84,20 @@ def run(env: ICubJumpEnv, seed: int, at_takeoff: Callable[[], None]) -> int:
     raise AssertionError  # unreachable: every episode ends
 
 
+def bench_reset(controller: ControllerName, episodes: int) -> None:
+    """Print what a reset costs with whole-body plans, with the same command and with another."""
+    env = make_env(JumpConfig(controller=controller, planner="whole_body"))
+    durations: dict[bool, list[float]] = {False: [], True: []}
+    for seed in range(episodes):
+        command = 0.03 + 0.02 * seed / episodes
+        for again in (False, True):
+            start = time.perf_counter()
+            env.reset(seed=seed, options={"jump_height": command})
+            durations[again].append(1e3 * (time.perf_counter() - start))
+    same, other = np.median(durations[True]), np.median(durations[False])
+    print(f"{controller}: reset {same:.1f} ms, with a new whole-body command {other:.1f} ms")
+
+
 def bench(controller: ControllerName, episodes: int) -> None:
     """Print the throughput, and the shares of the parts in the launch and in all of it."""
     env = make_env(JumpConfig(controller=controller, randomization="hard"))
@@ -121,6 +135,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=21)
     arguments = parser.parse_args()
     for controller in ("velocity", "torque"):
+        bench_reset(controller, arguments.episodes)
         bench(controller, arguments.episodes)
 
 

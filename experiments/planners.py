@@ -41,12 +41,10 @@ from icub_jump_env.evaluation.statistics.difference import Difference, holm_corr
 from icub_jump_env.evaluation.statistics.intervals import Interval, bootstrap_interval
 from icub_jump_env.evaluation.statistics.summary import Rate
 from icub_jump_env.planning.plan import PlannerName
+from icub_jump_env.planning.scaled_curve import PAPER_DISPLACEMENT
 from icub_jump_env.simulation.randomization import RandomizationName
 
 WORLDS: tuple[RandomizationName, ...] = ("full", "hard")
-
-PAPER_DISPLACEMENT = 0.11
-"""m."""
 
 LOW = (0.02, 0.035, 0.05)
 """Commands (m) at which no planner may land less often than the paper's curve."""

@@ -163,7 +163,6 @@ class TestFiles:
             (lambda path: path.unlink(), "no such file"),
             (lambda path: path.write_bytes(path.read_bytes()[:-9] + b"123456789"), "damaged"),
             (lambda path: path.with_suffix(".json").write_text("{"), "not readable as JSON"),
-            (lambda path: path.with_suffix(".json").write_text("{}"), "damaged"),
         ],
     )
     def test_damaged_files_are_told(self, tmp_path, damage, match):
@@ -184,6 +183,10 @@ class TestFiles:
             (lambda f: {"rise": f.rise[None]}, "rise has the shape"),
             (lambda f: {"velocity": f.velocity[:, 1:]}, "different shapes"),
             (lambda f: {"landing": f.landing[:, 1:]}, "other joints"),
+            (lambda f: {"card": {**f.card, "format": 0}}, "its card is not of format 1"),
+            (lambda f: {"card": {**f.card, "optimum": None}}, "what binds"),
+            (lambda f: {"card": {**f.card, "optimum": {"binding": {"knee": [0]}}}}, "what binds"),
+            (lambda f: {"card": {**f.card, "optimum": {"binding": {}}}}, "how high"),
             (lambda f: {"card": {**f.card, "plans": []}}, "a card of other plans"),
             (lambda f: {"card": {**f.card, "plans": [{}] * len(f.rise)}}, "what binds"),
         ],
@@ -237,6 +240,21 @@ def test_a_copy_goes_on_bit_for_bit(name, copier):
     for _ in range(40):
         (ours, *_), (theirs, *_) = env.step(ZERO), twin.step(ZERO)
         np.testing.assert_array_equal(ours, theirs)
+
+
+def test_a_residual_moves_the_set_point_of_a_plan():
+    """By the filtered offset; the plan itself stays."""
+    env = ICubJumpEnv(planner="whole_body", jump_height=0.05)
+    env.reset(seed=0)
+    for _ in range(20):
+        env.step(np.ones(3))
+    controller, data = env._controller, env.data
+    controller.reference.update(controller.jump_time(data.time))
+    moved = controller.reference.setpoint.com_position.copy()
+    planned = controller.plan.sample(controller.jump_time(data.time)).com_position
+    assert controller.residual.offset.min() > 0.005
+    start = env._start_com
+    np.testing.assert_allclose(moved - start - planned, controller.residual.offset, atol=1e-9)
 
 
 def test_another_command_is_another_plan():

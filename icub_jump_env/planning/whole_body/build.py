@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import itertools
 import math
 from collections.abc import Iterator
@@ -18,7 +17,12 @@ from icub_jump_env.planning.whole_body.binding import binding
 from icub_jump_env.planning.whole_body.family import FORMAT, PlanFamily, model_hash
 from icub_jump_env.planning.whole_body.landing import LandingProgram
 from icub_jump_env.planning.whole_body.launch import Launch, LaunchProgram
-from icub_jump_env.planning.whole_body.margins import RETRACTION_SHARE, Branch, FamilyMargins
+from icub_jump_env.planning.whole_body.margins import (
+    RETRACTION_SHARE,
+    Branch,
+    FamilyMargins,
+    LandingMargins,
+)
 from icub_jump_env.planning.whole_body.optimum import physical_optimum
 from icub_jump_env.planning.whole_body.sagittal import SagittalModel, selection
 from icub_jump_env.robot.icub import GRAVITY
@@ -43,7 +47,15 @@ def build_family(robot: Robot, controller: str, margins: FamilyMargins) -> PlanF
         for index, branch in enumerate(margins.branches)
         for launch in _branch(program, branch)
     ]
-    landings = [_landing(model, margins.branches[index], launch) for index, launch in launches]
+    programs: dict[LandingMargins | None, LandingProgram] = {
+        branch.landing: LandingProgram(model, branch.landing)
+        for branch in margins.branches
+        if branch.landing is not None
+    }
+    landings = [
+        _landing(launch, programs.get(margins.branches[index].landing), robot)
+        for index, launch in launches
+    ]
     S = selection(robot)
     card: dict[str, Any] = {
         "format": FORMAT,
@@ -93,16 +105,15 @@ def _branch(program: LaunchProgram, branch: Branch) -> list[Launch]:
     return [launch for launch in reversed(launches) if launch.rise < branch.highest + 1e-4]
 
 
-def _landing(model: SagittalModel, branch: Branch, launch: Launch) -> tuple[Array, float]:
-    """The posture of flight and landing ((n,) rad), and the duration of the motion to it (s)."""
-    if branch.landing is not None:
-        program = _landing_program(model, branch.landing)
-        return model.posture(program.solve(launch)), branch.landing.retraction
+def _landing(launch: Launch, program: LandingProgram | None, robot: Robot) -> tuple[Array, float]:
+    """The posture of flight and landing ((n,) rad), and the duration of the motion to it (s).
+
+    Without a program they are the paper's.
+    """
+    if program is not None:
+        return program.model.posture(program.solve(launch)), program.margins.retraction
     flight = 2 * math.sqrt(2 * launch.rise / GRAVITY)
-    return model.robot.landing, RETRACTION_SHARE * flight
-
-
-_landing_program = functools.lru_cache(LandingProgram)
+    return robot.landing, RETRACTION_SHARE * flight
 
 
 def _rise(launch: Launch) -> float:

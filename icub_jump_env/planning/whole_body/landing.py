@@ -37,6 +37,10 @@ class LandingProgram:
     In the air the angular momentum is constant, so what the joints do turns the robot. The way
     from the posture at take-off shall leave the soles level at touch-down, with the CoM above
     their middle.
+
+    Attributes:
+        model: The robot in its sagittal plane.
+        margins: Where the posture may be.
     """
 
     def __init__(self, model: SagittalModel, margins: LandingMargins) -> None:
@@ -46,7 +50,7 @@ class LandingProgram:
             model: The robot in its sagittal plane.
             margins: Where the posture may be.
         """
-        self._model, self._margins = model, margins
+        self.model, self.margins = model, margins
         n, robot = len(COORDINATES), model.robot
         opti = self._opti = ca.Opti()
         self._posture = opti.variable(n)
@@ -75,10 +79,10 @@ class LandingProgram:
         )
 
     def _at(self, outputs: Any) -> dict[str, Any]:
-        return dict(zip(self._model.dynamics.name_out(), outputs, strict=True))
+        return dict(zip(self.model.dynamics.name_out(), outputs, strict=True))
 
     def _position_limits(self) -> tuple[Array, Array]:
-        margins, robot = self._margins, self._model.robot
+        margins, robot = self.margins, self.model.robot
         lower = coordinates(robot, robot.lower_position) + margins.position
         upper = coordinates(robot, robot.upper_position) - margins.position
         lower[ANKLE] = max(lower[ANKLE], margins.ankle)
@@ -91,13 +95,13 @@ class LandingProgram:
 
     def _sole_pitch(self, way: Any, landed: dict[str, Any]) -> Any:
         """Pitch of the soles at touch-down (rad)."""
-        retraction = self._margins.retraction
+        retraction = self.margins.retraction
         speed, drop = self._speed, self._height - landed["com"][1]
         flight = (speed + ca.sqrt(ca.fmax(speed**2 + 2 * GRAVITY * drop, 1e-6))) / GRAVITY
         done, rate = progress((np.arange(_SAMPLES) + 0.5) / _SAMPLES)
         n = len(COORDINATES)
         along = self._at(
-            self._model.dynamics.map(_SAMPLES)(
+            self.model.dynamics.map(_SAMPLES)(
                 self._start + way @ ca.DM(done).T, way @ ca.DM(rate).T, ca.DM.zeros(n, _SAMPLES)
             )
         )
@@ -112,7 +116,7 @@ class LandingProgram:
         Raises:
             PlanningError: If there are none within the margins.
         """
-        opti, margins = self._opti, self._margins
+        opti, margins = self._opti, self.margins
         takeoff = {name: values[-1] for name, values in launch.outputs.items()}
         preferred = np.array(margins.posture)
         arms = slice(SHOULDER, ELBOW + 1)
