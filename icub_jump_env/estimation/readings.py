@@ -21,6 +21,8 @@ class Readings:
         joint_velocity: (n,) encoders (rad/s).
         gravity: (3,) direction of gravity in the IMU frame, unit vector.
         gyro: (3,) angular velocity of the base in the IMU frame (rad/s).
+        accelerometer: (3,) specific force of the base, its acceleration minus gravity, in the
+            IMU frame: the mean since the reading before (m/s^2).
         foot_force: (2,) normal force under the left and right sole (N).
     """
 
@@ -28,6 +30,7 @@ class Readings:
     joint_velocity: Array
     gravity: Array = field(default_factory=lambda: np.zeros(3))
     gyro: Array = field(default_factory=lambda: np.zeros(3))
+    accelerometer: Array = field(default_factory=lambda: np.zeros(3))
     foot_force: Array = field(default_factory=lambda: np.zeros(2))
 
     @classmethod

@@ -58,6 +58,7 @@ class SensorConfig:
         joint_velocity: Encoders (rad/s).
         tilt: Direction of gravity from the IMU (rad about each of its axes).
         gyro: Angular velocity from the IMU (rad/s).
+        accelerometer: Specific force from the IMU (m/s^2).
         force: Force under a foot, each axis (N).
         moment: Moment about the middle of a sole, each axis (Nm).
         force_gain: Largest calibration error of the forces under a foot, as a share;
@@ -72,6 +73,7 @@ class SensorConfig:
     joint_velocity: SensorError = field(default_factory=SensorError)
     tilt: SensorError = field(default_factory=SensorError)
     gyro: SensorError = field(default_factory=SensorError)
+    accelerometer: SensorError = field(default_factory=SensorError)
     force: SensorError = field(default_factory=SensorError)
     moment: SensorError = field(default_factory=SensorError)
     force_gain: float = 0.0
@@ -96,7 +98,9 @@ class SensorConfig:
         return dataclasses.replace(self, **noisier)
 
 
-ERROR_KINDS = ("joint_position", "joint_velocity", "tilt", "gyro", "force", "moment")
+ERROR_KINDS = (
+    "joint_position", "joint_velocity", "tilt", "gyro", "force", "moment", "accelerometer",
+)  # fmt: skip
 """The readings that have a :class:`SensorError`."""
 
 _ENCODER_STEP = 2 * math.pi / 4096
@@ -113,6 +117,9 @@ SENSORS: Mapping[SensorName, SensorConfig] = MappingProxyType(
             # Assumptions: an attitude filter good to 0.5 deg, a MEMS gyroscope.
             tilt=SensorError(noise=0.009, bias=0.009),
             gyro=SensorError(noise=0.05, bias=0.01, drift=0.001),
+            # Assumptions: a calibrated MEMS accelerometer on a robot that vibrates. Data
+            # sheets give less noise (Xsens MTi-300: 60 ug/sqrt(Hz), 0.006 m/s^2 in 100 Hz).
+            accelerometer=SensorError(noise=0.05, bias=0.1),
             # Assumptions. Andrade Chavez, Traversaro and Pucci (Sensors 19(24):5521, 2019)
             # describe how the iCub's force/torque sensors lose their calibration once
             # mounted and drift with temperature.

@@ -23,14 +23,20 @@ from icub_jump_env.simulation.sensor_models import (
 
 Array = NDArray[np.float64]
 
-_VIEWS = ("_imu_rotation", "_imu_gyro", "_sole_forces", "_soles")
+_VIEWS = ("_imu_rotation", "_imu_gyro", "_base_velocity", "_sole_forces", "_soles")
+
+_STREAMS = (
+    "joint_position", "joint_velocity", "tilt", "gyro", "force", "moment", "force_gain",
+    "accelerometer",
+)  # fmt: skip
+"""Each has a generator of its own, so that the errors of one kind do not depend on another's."""
 
 
 class Sensors:
     """Takes :class:`Readings` of a physics, with their errors.
 
     Encoders show the present state; IMU and feet the beginning of the last physics step,
-    when MuJoCo evaluated them.
+    when MuJoCo evaluated them. The accelerometer's mean ends with the present.
 
     Attributes:
         readings: The latest readings, which :meth:`read` overwrites.
@@ -51,6 +57,7 @@ class Sensors:
             "joint_velocity": n,
             "tilt": 3,
             "gyro": 3,
+            "accelerometer": 3,
             "force": 6,
             "moment": 6,
         }
@@ -59,6 +66,8 @@ class Sensors:
         self.biased = False
         self._world_bias = np.zeros(n)
         self._down = np.array([0.0, 0.0, -1.0])
+        self._gravity = np.zeros(3)
+        self._last_velocity, self._last_time = np.zeros(3), 0.0
         self._jacobian = np.zeros((6, physics.model.nv))
         self._errors: dict[str, ErrorSource] = {}
         self._force_gain = np.zeros(2)
@@ -69,6 +78,8 @@ class Sensors:
         data = self._physics.data
         self._imu_rotation = data.site("imu").xmat.reshape(3, 3)
         self._imu_gyro = data.sensor("base_gyro").data
+        # The IMU sits at the origin of the base.
+        self._base_velocity = data.qvel[:3]
         self._sole_forces = [data.sensor(f"{side}_sole_force").data for side in "lr"]
         geoms = [self._physics.model.geom(sole_geom(side)) for side in "lr"]
         self._soles = [(data.geom_xpos[geom.id], int(geom.bodyid[0])) for geom in geoms]
@@ -84,15 +95,16 @@ class Sensors:
     def reset(self, world: World, seed: int) -> None:
         """Draw the errors of an episode in ``world``; ``seed`` is that of all noise."""
         config = self._config.with_noise_of(SENSORS["realistic"], world.sensor_noise)
-        # A generator for each, so that the errors of one kind do not depend on another's.
         self._errors = {
             kind: ErrorSource(
-                getattr(config, kind), self._channels[kind], np.random.default_rng([seed, index])
+                getattr(config, kind),
+                self._channels[kind],
+                np.random.default_rng([seed, _STREAMS.index(kind)]),
             )
-            for index, kind in enumerate(ERROR_KINDS)
+            for kind in ERROR_KINDS
             if getattr(config, kind) != SensorError()
         }
-        rng = np.random.default_rng([seed, len(ERROR_KINDS)])
+        rng = np.random.default_rng([seed, _STREAMS.index("force_gain")])
         self._force_gain = config.force_gain * rng.uniform(-1.0, 1.0, 2)
         self._wrong_forces = config.force_gain > 0.0 or not {"force", "moment"}.isdisjoint(
             self._errors
@@ -102,8 +114,10 @@ class Sensors:
             self.encoder_bias += self._errors["joint_position"].bias
         self.biased = bool(self.encoder_bias.any())
         self._world_bias[:] = world.encoder_bias
-        gravity = self._physics.model.opt.gravity
+        gravity = self._gravity
+        gravity[:] = self._physics.model.opt.gravity
         self._down[:] = gravity / np.linalg.norm(gravity)
+        self._last_velocity[:], self._last_time = 0.0, 0.0
         self._history.clear()
         self.torque_error[:] = 0.0
 
@@ -125,6 +139,7 @@ class Sensors:
         readings.joint_velocity[:] = self._physics.joint_velocity
         np.dot(self._down, self._imu_rotation, out=readings.gravity)
         readings.gyro[:] = self._imu_gyro
+        self._accelerate(readings)
         for foot, force in enumerate(self._sole_forces):
             readings.foot_force[foot] = force[3]
         if self._errors or self._wrong_forces:
@@ -133,12 +148,21 @@ class Sensors:
             self._postpone(readings)
         return readings
 
+    def _accelerate(self, readings: Readings) -> None:
+        time = self._physics.data.time
+        passed, specific = time - self._last_time, -self._gravity
+        if passed > 0.0:
+            specific += (self._base_velocity - self._last_velocity) / passed
+        np.dot(specific, self._imu_rotation, out=readings.accelerometer)
+        self._last_velocity[:], self._last_time = self._base_velocity, time
+
     def _falsify(self, readings: Readings) -> None:
         time = self._physics.data.time
         error = {kind: source.at(time) for kind, source in self._errors.items()}
         readings.joint_position += error.get("joint_position", 0.0)
         readings.joint_velocity += error.get("joint_velocity", 0.0)
         readings.gyro += error.get("gyro", 0.0)
+        readings.accelerometer += error.get("accelerometer", 0.0)
         if "tilt" in error:
             readings.gravity += _cross(error["tilt"], readings.gravity)
             readings.gravity /= np.linalg.norm(readings.gravity)

@@ -46,7 +46,8 @@ def readings(made):
 
 
 READING = {"joint_position": "joint_position", "joint_velocity": "joint_velocity",
-           "tilt": "gravity", "gyro": "gyro", "force": "foot_force", "moment": None}  # fmt: skip
+           "tilt": "gravity", "gyro": "gyro", "force": "foot_force", "moment": None,
+           "accelerometer": "accelerometer"}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ERROR_KINDS)
@@ -122,6 +123,34 @@ def test_gravity_stays_a_unit_vector_tilted_by_the_error(physics):
     wrong = readings(made)["gravity"]
     assert np.linalg.norm(wrong) == pytest.approx(1.0)
     assert 0.001 < np.arccos(truth @ wrong) < 0.02 * math.sqrt(3)
+
+
+class TestAccelerometer:
+    def test_a_falling_robot_feels_nothing_and_a_resting_one_its_weight(self):
+        physics = Physics(ROBOT, 0.001)
+        physics.reset(np.concatenate(([0, 0, 2.0, 0.9, 0.1, 0.3, 0.3], ROBOT.crouch)))
+        made = sensors(physics)
+        resting = readings(made)
+        np.testing.assert_allclose(resting["accelerometer"], -9.81 * resting["gravity"])
+        for _ in range(5):
+            physics.step(zeros)
+        np.testing.assert_allclose(readings(made)["accelerometer"], 0.0, atol=1e-9)
+
+    def test_it_is_the_mean_since_the_reading_before(self):
+        """Turned into the world and summed up it gives the velocity gained."""
+        physics = Physics(ROBOT, 0.001)
+        physics.reset(np.concatenate(([0, 0, 2.0, 0.9, 0.1, 0.3, 0.3], ROBOT.crouch)))
+        made = sensors(physics)
+        readings(made)
+        gained, last = np.zeros(3), physics.data.time
+        for n_steps in (5, 2, 3):
+            for _ in range(n_steps):
+                physics.step(np.full(ROBOT.n_joints, 5.0), push=100.0)
+            felt = physics.data.site("imu").xmat.reshape(3, 3) @ readings(made)["accelerometer"]
+            gained += (felt + [0.0, 0.0, -9.81]) * (physics.data.time - last)
+            last = physics.data.time
+        np.testing.assert_allclose(gained, physics.data.qvel[:3], atol=1e-12)
+        assert np.abs(gained).min() > 0.01
 
 
 def test_wrench_errors_reach_the_torques_through_the_transposed_jacobian(physics):
