@@ -15,9 +15,9 @@ from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.actuators.config import ACTUATORS, FRICTION, ActuatorConfig
 from icub_jump_env.simulation.actuators.torque_loops import TorqueFeedback
+from icub_jump_env.simulation.disturbances import PUSH_DURATION
 from icub_jump_env.simulation.randomization import Randomization
 from icub_jump_env.simulation.sensor_models import SENSORS, SensorConfig, SensorError
-from icub_jump_env.simulation.simulation import PUSH_DURATION
 
 ROBOT = load_robot()
 

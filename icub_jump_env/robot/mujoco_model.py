@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import mujoco
@@ -16,6 +17,10 @@ from icub_jump_env.robot.robot import Robot
 from icub_jump_env.robot.urdf import mesh_root
 
 FLOOR_GEOM = "floor"
+BLOCK_GEOMS = STEP_GEOM, EDGE_GEOM = ("step", "edge")
+BLOCK_HALF_SIZE = (0.5, 0.25, 0.1)
+"""Of each block that may come to lie on the floor (m); most of its height is below the floor, so
+that nothing comes near its underside."""
 CAMERA = "side"
 """The default one."""
 COLLISION_GROUP = 3
@@ -30,6 +35,7 @@ _CAMERAS = {
 
 _FLOOR_COLORS = ((0.86, 0.87, 0.89), (0.78, 0.80, 0.83))
 _BOX_COLOR = (0.45, 0.55, 0.7, 1.0)
+_BLOCK_COLOR = (0.70, 0.62, 0.50, 1.0)
 
 
 def sole_geom(side: str) -> str:
@@ -38,7 +44,11 @@ def sole_geom(side: str) -> str:
 
 
 def build_model(
-    robot: Robot, timestep: float, visuals: bool = False, self_collision: bool = False
+    robot: Robot,
+    timestep: float,
+    visuals: bool = False,
+    self_collision: bool = False,
+    blocks: bool = False,
 ) -> mujoco.MjModel:
     """Compile the iCub with a free base, one motor per joint, on a flat floor.
 
@@ -51,6 +61,7 @@ def build_model(
         timestep: Physics step (s).
         visuals: Load the iCub's meshes. They have no effect on the dynamics.
         self_collision: Let the links touch each other.
+        blocks: Add two blocks, for now deep below the floor.
 
     Returns:
         The compiled model.
@@ -73,6 +84,8 @@ def build_model(
         geom.group = VISUAL_GROUP
     spec.body(robot.base_link).add_freejoint(name="base")
     _add_contact_geometry(spec, robot)
+    if blocks:
+        _add_blocks(spec)
     if self_collision:
         _add_self_collision(spec)
     _add_motors(spec, robot)
@@ -118,6 +131,20 @@ def _add_contact_geometry(spec: mujoco.MjSpec, robot: Robot) -> None:
             mass=0.0,
             group=COLLISION_GROUP,
             rgba=_BOX_COLOR,
+        )
+
+
+def _add_blocks(spec: mujoco.MjSpec) -> None:
+    for name in BLOCK_GEOMS:
+        spec.worldbody.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[0.0, 0.0, -2.0],
+            size=BLOCK_HALF_SIZE,
+            contype=1,
+            conaffinity=0,
+            friction=[FEET_FRICTION, 0.005, 0.0001],
+            rgba=_BLOCK_COLOR,
         )
 
 
@@ -190,7 +217,8 @@ def _add_sensors(spec: mujoco.MjSpec, robot: Robot) -> None:
         objtype=mujoco.mjtObj.mjOBJ_SITE,
         objname="imu",
     )
-    geom = mujoco.mjtObj.mjOBJ_GEOM
+    # What the world body has is ground: the floor, and blocks on it.
+    ground: dict[str, Any] = {"objtype": body, "objname": "world"}
     field = mujoco.mjtConDataField
     found_and_force = (1 << int(field.mjCONDATA_FOUND)) | (1 << int(field.mjCONDATA_FORCE))
     net_force, one_slot = 3, 1
@@ -198,17 +226,15 @@ def _add_sensors(spec: mujoco.MjSpec, robot: Robot) -> None:
         spec.add_sensor(
             name=f"{side}_sole_force",
             type=sensor.mjSENS_CONTACT,
-            objtype=geom,
-            objname=FLOOR_GEOM,
-            reftype=geom,
+            **ground,
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
             refname=sole_geom(side),
             intprm=[found_and_force, net_force, one_slot],
         )
     spec.add_sensor(
         name="floor_force",
         type=sensor.mjSENS_CONTACT,
-        objtype=geom,
-        objname=FLOOR_GEOM,
+        **ground,
         intprm=[found_and_force, net_force, one_slot],
     )
 

@@ -20,9 +20,12 @@ _HUGE = 1e3
 class Physics:
     """One iCub on a floor.
 
-    The state is written in :meth:`reset` alone; after it forces enter only as motor
-    torques through ``data.ctrl``, and where the models have them as gear friction through
-    ``data.qfrc_applied`` and as a push on the chest through ``data.xfrc_applied``.
+    The state is written in :meth:`reset`; after it forces enter as motor torques through
+    ``data.ctrl``, and where the models have them as gear friction through
+    ``data.qfrc_applied`` and as a push on the chest through ``data.xfrc_applied``. Of the
+    :class:`icub_jump_env.simulation.disturbances.Disturbances`, which none has by default, a
+    spin adds to ``data.qvel`` at lift-off, and another ground moves geometries of ``model``
+    at the apex.
 
     Attributes:
         robot: The robot.
@@ -30,6 +33,8 @@ class Physics:
         data: The MuJoCo data.
         joint_position: (n,) live view of the joint positions (rad).
         joint_velocity: (n,) live view of the joint velocities (rad/s).
+        chest_force: (3,) live view of the external force on the chest's CoM (N), world axes;
+            it acts until it is changed.
         evaluated_time: Time (s) for which MuJoCo last evaluated forces, sensors and all
             that depends on the state: the beginning of the last step.
     """
@@ -40,9 +45,10 @@ class Physics:
         timestep: float,
         visuals: bool = False,
         self_collision: bool = False,
+        blocks: bool = False,
     ) -> None:
         self.robot = robot
-        self.model = build_model(robot, timestep, visuals, self_collision)
+        self.model = build_model(robot, timestep, visuals, self_collision, blocks)
         self.data = mujoco.MjData(self.model)
         self._bind()
 
@@ -53,7 +59,7 @@ class Physics:
         self.joint_velocity = data.qvel[6:]
         self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
         self._joint_force = data.qfrc_applied[6:]
-        self._chest_force = data.xfrc_applied[self.model.body(self.robot.chest_link).id]
+        self.chest_force = data.xfrc_applied[self.model.body(self.robot.chest_link).id, :3]
         self._warnings = data.warning.number
         self._last_time = data.time
         self.evaluated_time = data.time
@@ -87,19 +93,17 @@ class Physics:
         self.data.time = self._last_time = self.evaluated_time = 0.0
         mujoco.mj_forward(self.model, self.data)
 
-    def step(self, torque: Array, friction: Array | None = None, push: float = 0.0) -> None:
+    def step(self, torque: Array, friction: Array | None = None) -> None:
         """Advance by one physics step.
 
         Args:
             torque: (n,) motor torques on the joint side (Nm), which MuJoCo clamps at the
                 effort limits.
             friction: (n,) torques that joint friction takes away from them (Nm).
-            push: Force on the chest's CoM along +x (N).
         """
         self._ctrl[:] = torque
         if friction is not None:
             np.negative(friction, out=self._joint_force)
-        self._chest_force[0] = push
         self.evaluated_time = self.data.time
         mujoco.mj_step(self.model, self.data)
         time = self.data.time

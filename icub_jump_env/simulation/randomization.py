@@ -20,7 +20,7 @@ from icub_jump_env.robot.robot import Robot
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 
-RandomizationName = Literal["none", "mild", "full", "hard"]
+RandomizationName = Literal["none", "mild", "full", "hard", "disturbed"]
 
 _DEG = math.radians(1.0)
 _ALLOWED: Mapping[str, Range] = MappingProxyType(
@@ -37,6 +37,19 @@ _ALLOWED: Mapping[str, Range] = MappingProxyType(
         "slope": (-15 * _DEG, 15 * _DEG),
         "encoder_bias": (-5 * _DEG, 5 * _DEG),
         "push": (-20.0, 20.0),
+        "lateral_slope": (-15 * _DEG, 15 * _DEG),
+        "push_direction": (-math.pi, math.pi),
+        "takeoff_spin": (-5.0, 5.0),
+        "flight_push": (-20.0, 20.0),
+        "flight_push_time": (0.0, 0.5),
+        "flight_push_direction": (-math.pi, math.pi),
+        "floor_tilt": (-15 * _DEG, 15 * _DEG),
+        "floor_tilt_lateral": (-15 * _DEG, 15 * _DEG),
+        "step": (0.0, 0.05),
+        "edge": (-0.05, 0.05),
+        "landing_push": (-20.0, 20.0),
+        "landing_push_time": (0.0, 5.0),
+        "landing_push_direction": (-math.pi, math.pi),
     }
 )
 _UNITS = {
@@ -46,7 +59,22 @@ _UNITS = {
     "slope": "rad",
     "encoder_bias": "rad",
     "push": "N s",
+    "lateral_slope": "rad",
+    "push_direction": "rad",
+    "takeoff_spin": "rad/s",
+    "flight_push": "N s",
+    "flight_push_time": "s",
+    "flight_push_direction": "rad",
+    "floor_tilt": "rad",
+    "floor_tilt_lateral": "rad",
+    "step": "m",
+    "edge": "m",
+    "landing_push": "N s",
+    "landing_push_time": "s",
+    "landing_push_direction": "rad",
 }
+_STREAM = 100
+"""Stream of the disturbances; the sensors have the first ones of the same seed."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +83,10 @@ class Randomization:
 
     By default nothing varies. Every range can be set alone; with the same seed each draws
     the same share of its range, whatever the others, the controller or the policy are.
+
+    Pushes act on the chest's CoM for 50 ms, within the horizontal plane: direction 0 is +x,
+    pi/2 is +y. What lift-off, apex and touch-down mean:
+    :class:`icub_jump_env.simulation.disturbances.Disturbances`.
 
     Attributes:
         link_mass: Factor on mass and inertia, of each link on its own.
@@ -73,8 +105,24 @@ class Randomization:
             the world frame stays with the floor.
         encoder_bias: Constant encoder error (rad) of each leg pitch joint: hips, knees,
             ankles.
-        push: Impulse on the chest along +x (N s), over 50 ms at a random time of the
-            launch.
+        push: Impulse on the chest (N s) at a random time of the launch.
+        lateral_slope: Slope of the ground (rad), positive uphill in +y.
+        push_direction: Direction of that push (rad).
+        takeoff_spin: Angular velocity about +y (rad/s) that the robot as a whole is given
+            about its CoM at lift-off; the CoM's velocity stays.
+        flight_push: Impulse on the chest in flight (N s).
+        flight_push_time: When that push begins (s after lift-off).
+        flight_push_direction: Its direction (rad).
+        floor_tilt: Tilt of the floor from the apex on (rad), positive uphill in +x, about the
+            point of the floor midway below the soles.
+        floor_tilt_lateral: The same (rad), positive uphill in +y.
+        step: Height of a block (m) that from the apex on lies under the whole left sole.
+        edge: Height of a block (m) that from the apex on lies under the front (positive) or
+            the rear (negative) of the left sole: it begins 2 cm ahead of, or behind, the
+            sole's middle. It lies on the step, if there is one.
+        landing_push: Impulse on the chest after the landing (N s).
+        landing_push_time: When that push begins (s after touch-down).
+        landing_push_direction: Its direction (rad).
 
     Raises:
         ConfigError: If a range is out of bounds or upside down.
@@ -92,6 +140,19 @@ class Randomization:
     slope: Range = (0.0, 0.0)
     encoder_bias: Range = (0.0, 0.0)
     push: Range = (0.0, 0.0)
+    lateral_slope: Range = (0.0, 0.0)
+    push_direction: Range = (0.0, 0.0)
+    takeoff_spin: Range = (0.0, 0.0)
+    flight_push: Range = (0.0, 0.0)
+    flight_push_time: Range = (0.02, 0.02)
+    flight_push_direction: Range = (0.0, 0.0)
+    floor_tilt: Range = (0.0, 0.0)
+    floor_tilt_lateral: Range = (0.0, 0.0)
+    step: Range = (0.0, 0.0)
+    edge: Range = (0.0, 0.0)
+    landing_push: Range = (0.0, 0.0)
+    landing_push_time: Range = (0.4, 0.4)
+    landing_push_direction: Range = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -106,6 +167,11 @@ class Randomization:
     def varies(self) -> bool:
         """Whether any world drawn from it can differ from the nominal one."""
         return self != Randomization()
+
+    @property
+    def blocks(self) -> bool:
+        """Whether any world drawn from it can have a step or an edge."""
+        return any(bound != 0.0 for bound in (*self.step, *self.edge))
 
 
 _FULL = Randomization(
@@ -133,20 +199,29 @@ def _halved(ranges: Randomization) -> Randomization:
     return Randomization(**halves)
 
 
+_HARD = dataclasses.replace(
+    _FULL,
+    slope=(-1.5 * _DEG, 1.5 * _DEG),
+    encoder_bias=(-1.0 * _DEG, 1.0 * _DEG),
+    push=(-2.0, 2.0),
+)
+
 RANDOMIZATIONS: Mapping[RandomizationName, Randomization] = MappingProxyType(
     {
         "none": Randomization(),
         "mild": _halved(_FULL),
         "full": _FULL,
-        "hard": dataclasses.replace(
-            _FULL,
-            slope=(-1.5 * _DEG, 1.5 * _DEG),
-            encoder_bias=(-1.0 * _DEG, 1.0 * _DEG),
-            push=(-2.0, 2.0),
+        "hard": _HARD,
+        "disturbed": dataclasses.replace(
+            _HARD,
+            slope=(-4.5 * _DEG, 4.5 * _DEG),
+            encoder_bias=(-3.0 * _DEG, 3.0 * _DEG),
+            push=(-6.0, 6.0),
         ),
     }
 )
-"""Ranges by name: ``mild`` is half of ``full``; ``hard`` adds slope, encoder bias and pushes."""
+"""Ranges by name: ``mild`` is half of ``full``; ``hard`` adds slope, encoder bias and pushes,
+``disturbed`` three times as much of these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +242,19 @@ class World:
         encoder_bias: (n,) rad; zero where encoders are right.
         push: N s.
         push_time: When the push begins, as a share of the launch in which it fits.
+        lateral_slope: rad.
+        push_direction: rad.
+        takeoff_spin: rad/s.
+        flight_push: N s.
+        flight_push_time: s after lift-off.
+        flight_push_direction: rad.
+        floor_tilt: rad.
+        floor_tilt_lateral: rad.
+        step: m.
+        edge: m.
+        landing_push: N s.
+        landing_push_time: s after touch-down.
+        landing_push_direction: rad.
     """
 
     link_mass: Array
@@ -182,6 +270,19 @@ class World:
     encoder_bias: Array
     push: float
     push_time: float
+    lateral_slope: float = 0.0
+    push_direction: float = 0.0
+    takeoff_spin: float = 0.0
+    flight_push: float = 0.0
+    flight_push_time: float = 0.0
+    flight_push_direction: float = 0.0
+    floor_tilt: float = 0.0
+    floor_tilt_lateral: float = 0.0
+    step: float = 0.0
+    edge: float = 0.0
+    landing_push: float = 0.0
+    landing_push_time: float = 0.0
+    landing_push_direction: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Plain floats and tuples of floats."""
@@ -195,17 +296,14 @@ class World:
 def draw_world(
     ranges: Randomization, robot: Robot, n_links: int, rng: np.random.Generator
 ) -> World:
-    """Draw the world of one episode.
+    """Draw the world of one episode, but for what :func:`draw_disturbances` adds to it.
 
     Always consumes the same number of random numbers, so that a seed means the same
     world with every range.
     """
 
     def uniform(bounds: Range, size: int) -> Array:
-        low, high = bounds
-        # This form gives a bound exactly where both are equal.
-        values: Array = low + rng.random(size) * (high - low)
-        return values
+        return _uniform(rng, bounds, size)
 
     n = robot.n_joints
     link_mass = uniform(ranges.link_mass, n_links)
@@ -235,3 +333,31 @@ def draw_world(
         push_time=float(rng.random()),
         **scalars,
     )
+
+
+_DISTURBANCES = (
+    "lateral_slope", "push_direction", "takeoff_spin",
+    "flight_push", "flight_push_time", "flight_push_direction",
+    "floor_tilt", "floor_tilt_lateral", "step", "edge",
+    "landing_push", "landing_push_time", "landing_push_direction",
+)  # fmt: skip
+"""In the order of the draws, which never changes: others can only be appended."""
+
+
+def draw_disturbances(ranges: Randomization, world: World, seed: int) -> World:
+    """Add what disturbs an episode to its ``world``; ``seed`` is that of the sensors' noise.
+
+    From a stream of its own, which leaves all other draws as they were without it.
+    """
+    rng = np.random.default_rng([seed, _STREAM])
+    drawn: dict[str, Any] = {
+        name: float(_uniform(rng, getattr(ranges, name), 1)[0]) for name in _DISTURBANCES
+    }
+    return dataclasses.replace(world, **drawn)
+
+
+def _uniform(rng: np.random.Generator, bounds: Range, size: int) -> Array:
+    low, high = bounds
+    # This form gives a bound exactly where both are equal.
+    values: Array = low + rng.random(size) * (high - low)
+    return values

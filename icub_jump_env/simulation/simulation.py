@@ -12,9 +12,15 @@ from icub_jump_env.control.command import JointCommand
 from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.simulation.actuators.actuators import Actuators
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
+from icub_jump_env.simulation.disturbances import Disturbances
 from icub_jump_env.simulation.ground_truth import GroundTruth
 from icub_jump_env.simulation.physics import Physics
-from icub_jump_env.simulation.randomization import Randomization, World, draw_world
+from icub_jump_env.simulation.randomization import (
+    Randomization,
+    World,
+    draw_disturbances,
+    draw_world,
+)
 from icub_jump_env.simulation.sensor_models import SensorConfig
 from icub_jump_env.simulation.sensors import Sensors
 from icub_jump_env.simulation.variation import ModelVariation
@@ -23,9 +29,6 @@ Array = NDArray[np.float64]
 
 SETTLING_TIME = 0.3
 """Time (s) that a reset lets the soles settle into the floor before the jump starts; ours."""
-
-PUSH_DURATION = 0.05
-"""How long the force of a push acts (s); our choice."""
 
 
 class Simulation:
@@ -67,7 +70,7 @@ class Simulation:
         self._variation = ModelVariation(physics.model, physics.robot)
         self._command_delay = command_delay
         self._pending: deque[JointCommand] = deque()
-        self._push = _NO_PUSH
+        self._disturbances: Disturbances | None = None
         self.world: World
 
     def reset(
@@ -83,27 +86,27 @@ class Simulation:
             rng: Where all randomness comes from.
             qpos: (n + 7,) MuJoCo positions to start from.
             torque: (n,) joint torques that hold them (Nm).
-            launch_duration: In which the push has to fit (s).
+            launch_duration: In which the push of the launch has to fit (s).
         """
         physics = self.physics
         robot, n_links = physics.robot, physics.model.nbody - 1
-        self.world = world = draw_world(self._randomization, robot, n_links, rng)
+        world = draw_world(self._randomization, robot, n_links, rng)
+        seed = int(rng.integers(2**63))
+        self.world = world = draw_disturbances(self._randomization, world, seed)
         if self._randomization.varies:
             self._variation.apply(world, physics.model)
             self.actuators = Actuators(
                 self._actuator_config, robot, self._dt, world.strength, world.joint_gain
             )
-        self.sensors.reset(world, seed=int(rng.integers(2**63)))
+        self.sensors.reset(world, seed)
         physics.reset(qpos)
         self.actuators.reset(qpos[7:], torque)
-        self._push = _NO_PUSH
+        self._disturbances = None
         for _ in range(round(SETTLING_TIME / self._dt)):
             self.step()
         physics.start_from_rest()
         self._pending.clear()
-        if world.push != 0.0:
-            start = world.push_time * (launch_duration - PUSH_DURATION)
-            self._push = start, start + PUSH_DURATION, world.push / PUSH_DURATION
+        self._disturbances = Disturbances.of(physics, world, launch_duration)
 
     def drawn(self) -> dict[str, Any]:
         """What the reset drew: ``world`` and ``sensor_errors``, plain values."""
@@ -127,16 +130,12 @@ class Simulation:
             position = position + self.sensors.encoder_bias
         actuators = self.actuators
         torque = actuators.torque(position, physics.joint_velocity)
-        start, end, force = self._push
-        pushing = start <= physics.data.time < end
-        physics.step(torque, actuators.friction, force if pushing else 0.0)
+        if self._disturbances is not None:
+            self._disturbances.act()
+        physics.step(torque, actuators.friction)
 
     def sense(self) -> Readings:
         """Take new readings; call once per control tick."""
         readings = self.sensors.read()
         self.actuators.torque_error[:] = self.sensors.torque_error
         return readings
-
-
-_NO_PUSH = (np.inf, np.inf, 0.0)
-"""Start (s), end (s) and force (N)."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from icub_jump_env.robot.icub import GRAVITY
-from icub_jump_env.robot.mujoco_model import FLOOR_GEOM, sole_geom
+from icub_jump_env.robot.mujoco_model import sole_geom
 from icub_jump_env.robot.robot import Robot
 from icub_jump_env.simulation.randomization import World
 
@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 
 _VARIED = (
     "body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_damping", "geom_friction",
+    "geom_pos", "geom_quat",
 )  # fmt: skip
+"""The last two are those of the ground, which changes in the course of an episode."""
 
 
 class ModelVariation:
@@ -27,25 +29,29 @@ class ModelVariation:
     def __init__(self, model: mujoco.MjModel, robot: Robot) -> None:
         self._chest = model.body(robot.chest_link).id
         self._nominal = {name: getattr(model, name).copy() for name in _VARIED}
+        self._disabled = model.opt.disableflags
+        soles = (model.geom(sole_geom(side)).id for side in "lr")
+        self._soles_and_ground = [*soles, *np.flatnonzero(model.geom_bodyid == 0)]
 
     def apply(self, world: World, model: mujoco.MjModel) -> None:
         """Turn ``model`` into ``world``. Motors and sensors are not part of the model."""
         for name, values in self._nominal.items():
             getattr(model, name)[:] = values
+        model.opt.disableflags = self._disabled
         model.body_mass[1:] *= world.link_mass
         model.body_inertia[1:] *= world.link_mass[:, None]
         _add_point_mass(model, self._chest, world.payload_mass, world.payload_offset)
         model.dof_damping[6:] *= world.damping
         # A contact takes the larger friction of its two geoms: both get the same.
-        for geom in (FLOOR_GEOM, *(sole_geom(side) for side in "lr")):
-            model.geom_friction[model.geom(geom).id, 0] = world.friction
+        model.geom_friction[self._soles_and_ground, 0] = world.friction
+        downhill = -GRAVITY * math.cos(world.slope)
         model.opt.gravity[:] = (
             -GRAVITY * math.sin(world.slope),
-            0.0,
-            -GRAVITY * math.cos(world.slope),
+            downhill * math.sin(world.lateral_slope),
+            downhill * math.cos(world.lateral_slope),
         )
-        # Subtree masses and the like follow from the above. The scratch data keeps the
-        # simulation's own from being moved to the reference configuration.
+        # Subtree masses, geom_sameframe and the like follow from the above. The scratch data
+        # keeps the simulation's own from being moved to the reference configuration.
         mujoco.mj_setConst(model, mujoco.MjData(model))
 
 

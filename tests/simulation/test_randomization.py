@@ -9,13 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.robot import icub
 from icub_jump_env.robot.robot import load_robot
+from icub_jump_env.simulation.disturbances import ground_rotation
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import (
     RANDOMIZATIONS,
     Randomization,
+    draw_disturbances,
     draw_world,
 )
 from icub_jump_env.simulation.variation import ModelVariation
@@ -26,9 +30,20 @@ FIELDS = [field.name for field in dataclasses.fields(Randomization)]
 LINKS = 40
 seeds = st.integers(0, 2**31)
 
+DISTURBED = dataclasses.replace(
+    RANDOMIZATIONS["hard"],
+    lateral_slope=(-0.1, 0.1), push_direction=(-3.0, 3.0), takeoff_spin=(-5.0, 1.0),
+    flight_push=(2.0, 6.0), flight_push_time=(0.0, 0.1), flight_push_direction=(-1.0, 0.0),
+    floor_tilt=(-0.05, 0.1), floor_tilt_lateral=(0.02, 0.03), step=(0.0, 0.02),
+    edge=(-0.03, 0.01), landing_push=(-20.0, 3.0), landing_push_time=(0.0, 2.0),
+    landing_push_direction=(-2.0, 2.0),
+)  # fmt: skip
+"""Every range is wide."""
+
 
 def draw(ranges, seed):
-    return draw_world(ranges, ROBOT, LINKS, np.random.default_rng(seed))
+    world = draw_world(ranges, ROBOT, LINKS, np.random.default_rng(seed))
+    return draw_disturbances(ranges, world, seed)
 
 
 class TestRanges:
@@ -52,6 +67,14 @@ class TestRanges:
         np.testing.assert_allclose(np.degrees(hard.encoder_bias), [-1.0, 1.0])
         assert hard.push == (-2.0, 2.0)
 
+    def test_disturbed_is_hard_with_three_times_as_much_of_these(self):
+        disturbed, hard = RANDOMIZATIONS["disturbed"], RANDOMIZATIONS["hard"]
+        for name in FIELDS:
+            factor = 3 if name in ("slope", "encoder_bias", "push") else 1
+            np.testing.assert_allclose(
+                getattr(disturbed, name), factor * np.array(getattr(hard, name))
+            )
+
     def test_mild_reaches_half_as_far(self):
         none, mild, full = (RANDOMIZATIONS[name] for name in ("none", "mild", "full"))
         for name in FIELDS:
@@ -70,6 +93,11 @@ class TestRanges:
             ("friction", (0.0, 1.0)), ("friction", (1.0, 0.4)), ("friction", 0.5),
             ("strength", (0.5, 1.2)), ("delay", (0, 1.5)), ("delay", (-1, 2)),
             ("slope", (-1.5, 1.5)), ("push", (0.0, math.nan)), ("link_mass", "heavy"),
+            ("step", (-0.01, 0.0)), ("edge", (0.0, 0.06)), ("floor_tilt", (0.3, 0.0)),
+            ("floor_tilt_lateral", (0, 0.3)), ("lateral_slope", (-0.3, 0)),
+            ("takeoff_spin", (0, 6)), ("flight_push", (0, 21)), ("flight_push_time", (-1, 0)),
+            ("landing_push", 2.0), ("landing_push_time", (0, 5.1)), ("push_direction", (0, 4)),
+            ("flight_push_direction", (0, 4)), ("landing_push_direction", (0, 4)),
         ],
     )  # fmt: skip
     def test_bad_ranges_are_refused(self, field, value):
@@ -81,7 +109,7 @@ class TestRanges:
 class TestDraws:
     @given(seeds)
     def test_draws_stay_in_their_ranges(self, seed):
-        ranges = RANDOMIZATIONS["hard"]
+        ranges = DISTURBED
         world = draw(ranges, seed)
         for name in FIELDS:
             drawn = np.asarray(getattr(world, name))
@@ -99,12 +127,32 @@ class TestDraws:
 
     @given(seeds, st.sampled_from(FIELDS))
     def test_each_can_be_set_alone_and_draws_the_same_as_in_company(self, seed, name):
-        hard = RANDOMIZATIONS["hard"]
-        alone = draw(Randomization(**{name: getattr(hard, name)}), seed)
-        together, nominal = draw(hard, seed), draw(Randomization(), seed)
+        alone = draw(Randomization(**{name: getattr(DISTURBED, name)}), seed)
+        together, nominal = draw(DISTURBED, seed), draw(Randomization(), seed)
         for field in FIELDS:
             expected = together if field == name else nominal
             np.testing.assert_array_equal(getattr(alone, field), getattr(expected, field))
+
+    def test_each_takes_the_same_share_of_any_range(self):
+        """Also of a narrower one; no two draws are the same share."""
+        shares = []
+        for name in FIELDS[FIELDS.index("push") :]:
+            low, high = getattr(DISTURBED, name)
+            narrow = dataclasses.replace(DISTURBED, **{name: (low, (low + high) / 2)})
+            drawn = getattr(draw(DISTURBED, 5), name) - low
+            assert getattr(draw(narrow, 5), name) - low == pytest.approx(drawn / 2)
+            shares.append(round(drawn / (high - low), 6))
+        assert len(set(shares)) == len(shares)
+
+    def test_disturbances_leave_the_other_draws_alone(self):
+        """They come from the seed that the sensors have, but from a stream of their own."""
+        states = []
+        for ranges in (RANDOMIZATIONS["hard"], DISTURBED):
+            env = make_env(JumpConfig.of(randomization=ranges, sensors="realistic"))
+            _, info = env.reset(seed=3)
+            old = [info["world"][name] for name in FIELDS[: FIELDS.index("lateral_slope")]]
+            states.append((old, info["sensor_errors"], env.np_random.bit_generator.state))
+        assert states[0] == states[1]
 
     def test_without_ranges_the_world_is_nominal(self):
         world = draw(Randomization(), 3)
@@ -235,6 +283,16 @@ class TestModel:
         assert np.linalg.norm(model.opt.gravity) == pytest.approx(icub.GRAVITY)
         # Uphill is forward: a ball would roll backward.
         assert model.opt.gravity[0] == pytest.approx(-icub.GRAVITY * math.sin(math.radians(1.5)))
+
+    def test_slopes_and_tilts_are_the_same_turn(self, physics):
+        """Gravity turns with the one, the floor with the other."""
+        slope, lateral = 0.05, -0.08
+        down = applied(physics, slope=slope, lateral_slope=lateral).opt.gravity / icub.GRAVITY
+        np.testing.assert_allclose(
+            ground_rotation(slope, lateral).apply(down), [0, 0, -1], atol=1e-12
+        )
+        assert down[0] == pytest.approx(-math.sin(slope))
+        assert math.atan2(down[1], -down[2]) == pytest.approx(-lateral)
 
     def test_damping_of_the_joints_alone(self, physics):
         nominal = physics.model.dof_damping.copy()

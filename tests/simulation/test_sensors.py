@@ -145,12 +145,12 @@ class TestAccelerometer:
         gained, last = np.zeros(3), physics.data.time
         for n_steps in (5, 2, 3):
             for _ in range(n_steps):
-                physics.step(np.full(ROBOT.n_joints, 5.0), push=100.0)
+                physics.step(np.full(ROBOT.n_joints, 5.0))
             felt = physics.data.site("imu").xmat.reshape(3, 3) @ readings(made)["accelerometer"]
             gained += (felt + [0.0, 0.0, -9.81]) * (physics.data.time - last)
             last = physics.data.time
         np.testing.assert_allclose(gained, physics.data.qvel[:3], atol=1e-12)
-        assert np.abs(gained).min() > 0.01
+        assert np.linalg.norm(gained) > 0.05
 
 
 def test_wrench_errors_reach_the_torques_through_the_transposed_jacobian(physics):
