@@ -60,9 +60,16 @@ class FeetFixedKinematics:
         base_rotation: (3, 3) orientation of ``root_link`` in the world.
         base_position: (3,) position of ``root_link`` in the world (m).
         base_p_com: (3,) CoM position in the base frame (m).
+        A_base: (6, 6) maps the base twist, base axes, to the centroidal momentum in them: linear
+            above angular. Its last block is the inertia of the robot as one rigid body.
+        A_joints: (6, n) maps joint velocities to the same.
+        base_M_ankles: ``pinocchio.SE3`` of the left and right ankle roll joint, base frame.
+        ankle_p_soles: (3,) middle of each sole's underside in the frame of its ankle (m).
         J_left: (6, 6) twist of the left foot of the left leg's joints, base frame.
         J_right: (6, 6) the same of the right foot.
         model: The Pinocchio model, shared; do not change it.
+        sole_positions: (2, 3) middle of the underside of the left and right sole, both at rest
+            on the floor (m).
         world_M_left_sole: ``pinocchio.SE3`` of the left sole frame, which stands still.
         world_M_ankle: Likewise of the left ankle roll joint.
     """
@@ -87,9 +94,16 @@ class FeetFixedKinematics:
         self._world_p_ankle = self.world_M_ankle.translation.copy()
         # Views of Pinocchio's buffers: reading an attribute costs more than using it.
         data = self.data
-        self._A_base, self._A_joints = data.Ag[:, :6], data.Ag[:, 6:]
+        self.A_base, self.A_joints = data.Ag[:, :6], data.Ag[:, 6:]
         self.J_left, self.J_right = data.J[:, 6:12], data.J[:, 12:18]
         self.base_p_com = data.com[0]
+        frames = [self.model.frames[self.model.getFrameId(name)] for name in robot.sole_frames]
+        self.base_M_ankles = [data.oMi[frame.parentJoint] for frame in frames]
+        middle = np.array([robot.sole.center_x, 0.0, robot.sole.bottom])
+        self.ankle_p_soles = [frame.placement.act(middle) for frame in frames]
+        chest = self.model.frames[self.model.getFrameId(robot.chest_link)]
+        self._base_M_spine = data.oMi[chest.parentJoint]
+        self._spine_chest_up = chest.placement.rotation[:, 1].copy()
         placement = data.oMi[ankle]
         self._ankle_R_base, self._base_p_ankle = placement.rotation.T, placement.translation
         self._joint_map = np.zeros((6, n))
@@ -112,6 +126,8 @@ class FeetFixedKinematics:
         stance_width = abs(data.oMf[left].actInv(data.oMf[right]).translation[1])
         sole_position = np.array([0.0, stance_width / 2, -self.robot.sole.bottom])
         self.world_M_left_sole = pin.SE3(np.eye(3), sole_position)
+        x, y = self.robot.sole.center_x, stance_width / 2
+        self.sole_positions = np.array([[x, y, 0.0], [x, -y, 0.0]])
         frame = model.frames[left]
         self.world_M_ankle = self.world_M_left_sole * frame.placement.inverse()
         return int(frame.parentJoint)
@@ -121,6 +137,11 @@ class FeetFixedKinematics:
         self.update(posture)
         quaternion = Rotation.from_matrix(self.base_rotation).as_quat()
         return np.concatenate((self.base_position, quaternion, posture))
+
+    def chest_up(self) -> Array:
+        """(3,) the chest's up axis in the base frame: the y axis of its link."""
+        up: Array = self._base_M_spine.rotation @ self._spine_chest_up
+        return up
 
     def com_shift(self, posture: Array) -> Array:
         """How the joints shift the CoM with both feet at rest, to first order.
@@ -154,8 +175,8 @@ class FeetFixedKinematics:
         np.add(R.dot(self.base_p_com), self.base_position, out=self.com)
 
         joint_map = self._joint_map
-        joint_map[:] = self._A_joints
-        self._joint_map_left -= self._A_base.dot(self.J_left)
+        joint_map[:] = self.A_joints
+        self._joint_map_left -= self.A_base.dot(self.J_left)
         np.dot(R, joint_map[:3], out=self.J_com)
         np.dot(R, joint_map[3:], out=self.J_momentum)
         self.J_com *= self._inverse_mass
