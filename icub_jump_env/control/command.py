@@ -18,7 +18,7 @@ class JointCommand(NamedTuple):
         position: (n,) desired joint positions (rad) now, or ``None`` for velocity
             control, where the servo integrates the velocity itself.
         torque: (n,) joint torques (Nm) for torque control, which passes by position
-            and velocity; else ``None``.
+            and velocity; NaN for joints that stay with the servo, ``None`` if all do.
     """
 
     velocity: Array | None = None

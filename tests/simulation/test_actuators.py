@@ -305,3 +305,45 @@ def test_bad_values_are_refused(kind, values):
     with pytest.raises(ConfigError) as refusal:
         kind(**values)
     assert refusal.value.field in values
+
+
+class TestMixedControl:
+    """Some joints under torque control, the others with the servo."""
+
+    driven = np.arange(N) % 3 == 0
+
+    def mixed(self, rng, made):
+        position, velocity, torque = 0.01 * rng.normal(size=N), rng.normal(size=N), np.arange(N)
+        made.command(JointCommand(velocity, position, np.where(self.driven, torque, np.nan)))
+        return JointCommand(velocity, position), JointCommand(torque=1.0 * torque)
+
+    @pytest.mark.parametrize("name", sorted(ACTUATORS))
+    def test_each_joint_does_what_it_did_if_all_were_like_it(self, name, rng):
+        both, servoed, driven = (of(ACTUATORS[name]) for _ in range(3))
+        for made in (both, servoed, driven):
+            made.reset(zeros, zeros)
+        by_servo, by_torque = self.mixed(rng, both)
+        servoed.command(by_servo)
+        driven.command(by_torque)
+        for _ in range(4):
+            expected = np.where(self.driven, *(m.torque(zeros, ones) for m in (driven, servoed)))
+            np.testing.assert_array_equal(both.torque(zeros, ones), expected)
+
+    @pytest.mark.parametrize("name", sorted(ACTUATORS))
+    def test_torque_control_of_all_can_follow(self, name, rng):
+        """The loops of the others were not left behind, nor made undefined."""
+        made = of(ACTUATORS[name])
+        made.reset(zeros, zeros)
+        self.mixed(rng, made)
+        for _ in range(50):
+            before = made.torque(zeros, zeros).copy()
+        made.command(JointCommand(torque=made._joint_torque.copy()))
+        after = made.torque(zeros, zeros)
+        np.testing.assert_allclose(after, before, atol=2.0)
+
+    def test_a_reset_forgets_it(self, rng):
+        made = actuators()
+        self.mixed(rng, made)
+        made.reset(zeros, ones)
+        np.testing.assert_allclose(made.torque(zeros, zeros), ones)
+        assert np.isnan(made.torque_command).all()

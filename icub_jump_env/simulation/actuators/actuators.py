@@ -53,6 +53,8 @@ class Actuators:
         self.friction = self._losses if config.friction > 0.0 else None
         self._joint_torque = np.zeros(n)
         self._torque_control = False
+        self._servoed = np.ones(n, dtype=bool)
+        self._mixed = False
         self.velocity_command = np.zeros(n)
         self.torque_command = np.full(n, np.nan)
         self.torque_error = np.zeros(n)
@@ -61,18 +63,21 @@ class Actuators:
         """Hold ``joint_position`` ((n,) rad) with ``torque`` ((n,) Nm)."""
         self._servo.reset(joint_position, torque)
         self._joint_torque[:] = torque
-        self._torque_control = False
+        self._torque_control = self._mixed = False
+        self._servoed[:] = True
         self.velocity_command[:] = 0.0
         self.torque_command[:] = np.nan
         self.torque_error[:] = 0.0
 
     def command(self, command: JointCommand) -> None:
         """Take a new command."""
-        torque_control = command.torque is not None
-        if torque_control and not self._torque_control:
-            self._loop.reset(self._joint_torque)
-        self._torque_control = torque_control
+        self._torque_control = command.torque is not None
         self.torque_command[:] = np.nan if command.torque is None else command.torque
+        servoed = np.isnan(self.torque_command)
+        if self._torque_control and (servoed != self._servoed).any():
+            self._loop.reset(self._joint_torque)
+        self._servoed = servoed
+        self._mixed = self._torque_control and bool(servoed.any())
         self.velocity_command[:] = 0.0 if command.velocity is None else command.velocity
         if command.position is not None:
             self._servo.move_to(command.position)
@@ -92,7 +97,14 @@ class Actuators:
             np.multiply(self._coulomb, np.tanh(joint_velocity / FRICTION_SPEED), out=self.friction)
         if self._torque_control:
             measured = self._joint_torque + self.torque_error
-            motor = self._loop.motor_torque(self.torque_command, measured, self._losses)
+            wanted = self.torque_command
+            if self._mixed:
+                # The loops of joints under the servo have nothing to do.
+                wanted = np.where(self._servoed, measured, wanted)
+            motor = self._loop.motor_torque(wanted, measured, self._losses)
+            if self._mixed:
+                servo = self._servo.torque(self.velocity_command, joint_position, joint_velocity)
+                motor = np.where(self._servoed, servo, motor)
         else:
             motor = self._servo.torque(self.velocity_command, joint_position, joint_velocity)
         self._motor.limit(motor, joint_velocity)
