@@ -20,6 +20,8 @@ from icub_jump_env.errors import ConfigError
 ControllerName = Literal["velocity", "torque"]
 SolverName = Literal["daqp", "osqp"]
 Constraints = Literal["soft", "hard"]
+FlightName = Literal["minimum_jerk", "feedback"]
+LandingName = Literal["hold", "feedback"]
 LaunchEnd = Literal["time", "lift_off"]
 
 Weights = tuple[float, ...]

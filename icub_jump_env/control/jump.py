@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.config import TorqueConfig, VelocityConfig
-from icub_jump_env.control.flight import MinimumJerkFlight
-from icub_jump_env.control.landing import HoldLanding
+from icub_jump_env.control.config import FlightName, LandingName, TorqueConfig, VelocityConfig
+from icub_jump_env.control.flight import FeedbackFlight, Flight, MinimumJerkFlight
+from icub_jump_env.control.landing import CROUCH_TIME, FeedbackLanding, HoldLanding, Landing
 from icub_jump_env.control.launch import Launch, TrackingController
 from icub_jump_env.control.phases import Phase, PhaseController, PhaseMachine, Tick
 from icub_jump_env.control.torque import TorqueController
@@ -20,11 +22,15 @@ from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float64]
 
+REST, SETTLING = 0.5, 0.25
+"""How long a robot that jumps again stands after touch-down, and in its next crouch (s)."""
+
 
 class JumpController:
     """Launch on the QP, then minimum jerk to the landing posture, which is held.
 
-    The jump has a clock of its own: it starts when :meth:`start` is called.
+    Or the same by feedback. Where another jump follows, its crouch is part of the landing. The
+    jump has a clock of its own: it starts when :meth:`start` is called.
 
     Attributes:
         reference: The set point of the launching phase.
@@ -38,6 +44,8 @@ class JumpController:
         config: VelocityConfig | TorqueConfig,
         residual: ResidualConfig,
         kinematics: FeetFixedKinematics,
+        flight_name: FlightName = "minimum_jerk",
+        landing_name: LandingName = "hold",
     ) -> None:
         """Set up the controller.
 
@@ -45,6 +53,8 @@ class JumpController:
             config: The controller of the launching phase, and when phases end.
             residual: How actions move the set point.
             kinematics: The model, which the estimator keeps up to date.
+            flight_name: The controller of the flight.
+            landing_name: The controller of the landing.
         """
         dt = 1.0 / config.frequency
         self.residual = ResidualFilter(residual.bandwidth)
@@ -52,6 +62,8 @@ class JumpController:
         self.phases = PhaseMachine(config.phases)
         self.plan: JumpPlan
         self._began = 0.0
+        self._following: JumpPlan | None = None
+        self._crouches = self._next_begins = math.inf
         self._in_all_phases = residual.phases == "all"
         shift = None
         if self._in_all_phases:
@@ -61,17 +73,41 @@ class JumpController:
             tracking = TorqueController(config, kinematics)
         else:
             tracking = VelocityController(config, kinematics)
-        flight = MinimumJerkFlight(self.residual, dt, shift)
+        flight: Flight
+        if flight_name == "feedback":
+            flight = FeedbackFlight(self.residual, dt, kinematics)
+        else:
+            flight = MinimumJerkFlight(self.residual, dt, shift)
+        landing: Landing
+        if landing_name == "feedback":
+            landing = FeedbackLanding(flight, self.residual, dt, kinematics, config.solver)
+        else:
+            landing = HoldLanding(flight)
+        self._landing = landing
         self._controllers: dict[Phase, PhaseController] = {
             Phase.LAUNCH: Launch(tracking, self.reference, dt),
             Phase.FLIGHT: flight,
-            Phase.LANDING: HoldLanding(flight),
+            Phase.LANDING: landing,
         }
 
-    def start(self, plan: JumpPlan, state: RobotState, time: float) -> None:
-        """Begin a jump in ``state``, ``time`` (s) after the start of the episode."""
-        self.plan = plan
+    def start(
+        self,
+        plan: JumpPlan,
+        state: RobotState,
+        time: float,
+        following: JumpPlan | None = None,
+    ) -> None:
+        """Begin a jump.
+
+        Args:
+            plan: Its plan.
+            state: The believed state.
+            time: Time since the start of the episode (s).
+            following: The plan of the jump after it, in whose crouch it ends.
+        """
+        self.plan, self._following = plan, following
         self._began = time
+        self._crouches = self._next_begins = math.inf
         self.phases.reset()
         self._controllers[Phase.LAUNCH].start(state, plan, 0.0)
 
@@ -83,6 +119,10 @@ class JumpController:
     def jump_time(self, time: float) -> float:
         """Time since the start of the jump (s), at ``time`` (s) of the episode."""
         return time - self._began
+
+    def due(self, time: float) -> JumpPlan | None:
+        """The plan of the next jump, if that is to begin at ``time`` (s) of the episode."""
+        return self._following if self.jump_time(time) >= self._next_begins else None
 
     def residual_acts(self, time: float) -> bool:
         """Whether a residual has an effect at ``time`` (s) of the episode."""
@@ -107,4 +147,9 @@ class JumpController:
         controller = self._controllers[phase]
         if phase is not before:
             controller.start(state, self.plan, time)
+            if phase is Phase.LANDING:
+                self._crouches = time + REST
+        if self._following is not None and time >= self._crouches:
+            self._landing.crouch(self._following, time)
+            self._crouches, self._next_begins = math.inf, time + CROUCH_TIME + SETTLING
         return controller.tick(state, time, residual_target)

@@ -13,7 +13,7 @@ from standing import GRAVITY, ROBOT, N, Oracle, Standing
 from icub_jump_env.control.config import ContactConfig
 from icub_jump_env.control.tasks.com import ComAcceleration, ComVelocity
 from icub_jump_env.control.tasks.contact import ContactLimits, SmallWrenches, contact_rows
-from icub_jump_env.control.tasks.feet import FeetAcceleration, FeetVelocity
+from icub_jump_env.control.tasks.feet import FeetAcceleration, FeetVelocity, SolesApart
 from icub_jump_env.control.tasks.limits import AccelerationLimits, TorqueLimits, VelocityLimits
 from icub_jump_env.control.tasks.momentum import MomentumIntegral, MomentumRate
 from icub_jump_env.control.tasks.motion import BaseMotion
@@ -367,3 +367,30 @@ class TestLimits:
         assert (problem.lower[: N + 12][normal] == 17.0).all()
         assert (problem.lower[: N + 12][~normal] < -1e5).all()
         assert (problem.upper[: N + 12] > 1e5).all()
+
+
+@pytest.mark.parametrize("speed", [-0.2, 0.0, 0.3])
+def test_soles_go_apart_along_the_vertical_alone(speed):
+    """Twists of both soles from Pinocchio, for joint velocities that fulfil the equation."""
+    case = Case(3)
+    task = SolesApart(case.kinematics)
+    task.speed = speed
+    rows, target = np.zeros((6, N)), np.zeros(6)
+    task.write(case.state, case.wanted, rows, target)
+    s_dot = np.linalg.lstsq(rows, target, rcond=None)[0]
+    oracle = case.oracle
+    nu = np.concatenate((np.zeros(6), s_dot))
+    left, right = (
+        placement.rotation @ (J @ nu)[part]
+        for placement, J in zip(oracle.placements, oracle.J, strict=True)
+        for part in (slice(3),)
+    )
+    turns = [
+        placement.rotation @ (J @ nu)[3:]
+        for placement, J in zip(oracle.placements, oracle.J, strict=True)
+    ]
+    # Where both turn alike with the base at rest, the line between the soles turns, too.
+    line = oracle.placements[1].translation - oracle.placements[0].translation
+    np.testing.assert_allclose(turns[1], turns[0], atol=1e-9)
+    apart = right - left - np.cross(turns[0], line)
+    np.testing.assert_allclose(apart, [0.0, 0.0, speed], atol=1e-9)

@@ -31,6 +31,21 @@ class FeetVelocity:
         rows[:] = self._kinematics.J_feet
 
 
+class SolesApart(FeetVelocity):
+    """J_rf nu - J_lf nu is a vertical speed: the right sole rises, relative to the left one.
+
+    Attributes:
+        speed: That speed (m/s).
+    """
+
+    speed = 0.0
+
+    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
+        """Write the equation; its rows have the left foot minus the right one, base axes."""
+        super().write(state, setpoint, rows, target)
+        np.multiply(self._kinematics.base_rotation[2], -self.speed, out=target[:3])
+
+
 class FeetAcceleration:
     """J_lf nu_dot + J_lf_dot nu = 0 and the same of the right foot, eq. (6c)."""
 
