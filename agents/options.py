@@ -157,6 +157,8 @@ class TrainOptions:
         check_count("checkpoint_every", self.checkpoint_every, 1, unit="updates")
         if self.env.rendering.mode is not None:
             raise ConfigError("render_mode", self.env.rendering.mode, "not in a training")
+        if self.env.jumps > 1:
+            raise ConfigError("jumps", self.env.jumps, "1 in a training")
         if self.ppo.episodes % self.jobs:
             raise ConfigError("jobs", self.jobs, f"a divisor of ppo.episodes={self.ppo.episodes}")
         if self.resume is not None and self.run not in (None, self.resume):

@@ -1,17 +1,18 @@
 """Humanoid jumping with the iCub: a Gymnasium environment around two QP controllers.
 
-Importing this package registers ``ICubJump-v0``::
+Importing this package registers ``ICubJump-v0``, the paper's jump, and ``ICubJump-v1``, which
+plans with the whole body and controls flight and landing by feedback::
 
     import gymnasium, icub_jump_env
 
-    env = gymnasium.make("ICubJump-v0", jump_height=0.04)
+    env = gymnasium.make("ICubJump-v1", jump_height=0.06)
 """
 
 from __future__ import annotations
 
 import gymnasium
 
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import VERSIONS, JumpConfig
 from icub_jump_env.control.config import (
     ContactConfig,
     PhaseConfig,
@@ -46,14 +47,16 @@ __version__ = "0.1.0"
 
 ENV_ID = "ICubJump-v0"
 
-MAX_EPISODE_STEPS = 100_000
+MAX_EPISODE_STEPS = 1_000_000
 """Guard only: every episode ends by itself."""
 
-gymnasium.register(
-    id=ENV_ID,
-    entry_point="icub_jump_env.env:ICubJumpEnv",
-    max_episode_steps=MAX_EPISODE_STEPS,
-)
+for _name, _defaults in VERSIONS.items():
+    gymnasium.register(
+        id=_name,
+        entry_point="icub_jump_env.env:ICubJumpEnv",
+        max_episode_steps=MAX_EPISODE_STEPS,
+        kwargs=dict(_defaults),
+    )
 
 __all__ = [
     "ENV_ID",

@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self, get_args
+from types import MappingProxyType
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from icub_jump_env.checks import (
     check_count,
     check_flag,
     check_number,
+    check_numbers,
     check_range,
     check_type,
     is_multiple,
@@ -24,10 +26,13 @@ from icub_jump_env.control.config import (
     CONTROLLERS,
     ControllerConfig,
     ControllerName,
+    FlightName,
+    LandingName,
     TorqueConfig,
     VelocityConfig,
 )
-from icub_jump_env.errors import ConfigError, UnknownFieldError
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.estimation.estimator import EstimatorName
 from icub_jump_env.mappings import nested
 from icub_jump_env.metrics.jump import SuccessConfig
 from icub_jump_env.planning.plan import Planner, PlannerName
@@ -47,7 +52,7 @@ from icub_jump_env.reward import RewardConfig
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot, load_robot
 from icub_jump_env.robot.urdf import DEFAULT_MODEL
-from icub_jump_env.shortcuts import PATHS, path_to
+from icub_jump_env.shortcuts import WithShortcuts
 from icub_jump_env.simulation.actuators.config import ACTUATORS, ActuatorConfig, ActuatorName
 from icub_jump_env.simulation.randomization import (
     RANDOMIZATIONS,
@@ -62,15 +67,32 @@ from icub_jump_env.simulation.sensor_models import (
     SensorName,
 )
 
+EnvName = Literal["ICubJump-v0", "ICubJump-v1"]
+VERSIONS: Mapping[EnvName, Mapping[str, Any]] = MappingProxyType(
+    {
+        "ICubJump-v0": {},
+        "ICubJump-v1": {
+            "planner": "whole_body",
+            "estimator": "imu",
+            "flight": "feedback",
+            "landing": "feedback",
+        },
+    }
+)
+"""The registered environments, and where their defaults are not those of JumpConfig."""
+
 JUMP_HEIGHT_RANGE = (0.01, 0.15)
+MOST_JUMPS = 100
 DISPLACEMENT_RANGE = (0.03, MAX_DISPLACEMENT)
 TIMESTEP_RANGE = (1e-5, 2e-3)
 AGENT_FREQUENCY_RANGE = (1.0, 1000.0)
 
 
 @dataclass(frozen=True)
-class JumpConfig:
+class JumpConfig(WithShortcuts):
     """What ``gymnasium.make("ICubJump-v0", ...)`` takes, beside the :class:`Shortcuts`.
+
+    The defaults are those of v0; :data:`VERSIONS` says which differ in v1.
 
     Attributes:
         robot: Model of the icub-models package.
@@ -78,7 +100,8 @@ class JumpConfig:
         controller: Controller of the launching phase: a name, a ``VelocityConfig`` or a
             ``TorqueConfig``.
         jump_height: Commanded rise of the CoM in flight (m); lowest and highest, if each
-            episode draws its own.
+            jump draws its own.
+        jumps: Jumps of an episode, each from a new crouch.
         planner: What the launch follows: the paper's scaled CoM curve from a fixed crouch, or
             whole-body plans within the robot's limits.
         plans: File of whole-body plans; by default the family of the package.
@@ -86,6 +109,10 @@ class JumpConfig:
             paper's 0.11 with scaling by displacement.
         com_scaling: What fixes the duration of the launch: the CoM displacement, or a
             final CoM acceleration of -9.81 m/s^2.
+        estimator: Where the state comes from: the paper's assumption that the feet stand still,
+            or the IMU as far as they do not.
+        flight: Minimum jerk to the landing posture, or soles placed by feedback.
+        landing: Hold the posture, or catch by feedback.
         residual: How actions move the reference.
         agent_frequency: Rate of ``env.step`` (Hz), a divisor of the control rate.
         timestep: Physics step (s).
@@ -109,10 +136,14 @@ class JumpConfig:
     ankle_shift: bool = True
     controller: ControllerName | VelocityConfig | TorqueConfig = "velocity"
     jump_height: float | tuple[float, float] = 0.04
+    jumps: int = 1
     planner: PlannerName = "scaled_curve"
     plans: str | None = None
     com_displacement: float | None = None
     com_scaling: ComScaling = "displacement"
+    estimator: EstimatorName = "feet_fixed"
+    flight: FlightName = "minimum_jerk"
+    landing: LandingName = "hold"
     residual: ResidualConfig = field(default_factory=ResidualConfig)
     agent_frequency: float = 100.0
     timestep: float = 0.001
@@ -131,7 +162,13 @@ class JumpConfig:
         check_type("robot", self.robot, str)
         load_robot(self.robot, self.ankle_shift)
         check_choice("com_scaling", self.com_scaling, get_args(ComScaling))
+        check_choice("estimator", self.estimator, get_args(EstimatorName))
+        for name, names in (("flight", FlightName), ("landing", LandingName)):
+            check_choice(name, getattr(self, name), get_args(names))
+            if getattr(self, name) == "feedback" and self.estimator != "imu":
+                raise ConfigError(name, "feedback", "only with estimator='imu'")
         store(self, jump_height=_check_heights(self.jump_height))
+        store(self, jumps=check_count("jumps", self.jumps, 1, MOST_JUMPS))
         if self.com_displacement is not None:
             displacement = check_number(
                 "com_displacement", self.com_displacement, *DISPLACEMENT_RANGE, "m"
@@ -246,18 +283,19 @@ class JumpConfig:
         """The command (m), where there is only one.
 
         Raises:
-            ConfigError: If each episode draws its own.
+            ConfigError: If each jump draws its own.
         """
         if isinstance(self.jump_height, tuple):
             raise ConfigError("jump_height", self.jump_height, "a single height here")
         return self.jump_height
 
-    def draw_height(self, rng: np.random.Generator) -> float:
-        """The command (m) of an episode."""
+    def draw_heights(self, rng: np.random.Generator) -> tuple[float, ...]:
+        """The commands (m) of an episode's jumps."""
         if not isinstance(self.jump_height, tuple):
-            return self.jump_height
+            return (self.jump_height,) * self.jumps
         # A stream of its own: a given command finds the same world as the same one drawn.
-        return rng.spawn(1)[0].uniform(*self.jump_height)
+        own = rng.spawn(1)[0]
+        return tuple(own.uniform(*self.jump_height) for _ in range(self.jumps))
 
     @property
     def robot_value(self) -> Robot:
@@ -306,54 +344,6 @@ class JumpConfig:
         """Control ticks per ``env.step``."""
         return round(self.controller_config.frequency / self.agent_frequency)
 
-    @classmethod
-    def of(cls, **keywords: Any) -> Self:
-        """Build from fields and shortcuts.
-
-        Raises:
-            UnknownFieldError: If a keyword is neither.
-            ConfigError: If a value is out of range.
-        """
-        return cls().replace(**keywords)
-
-    def replace(self, **changes: Any) -> Self:
-        """The same with other fields or shortcuts.
-
-        Raises:
-            UnknownFieldError: If a keyword is neither.
-            ConfigError: If a value is out of range.
-        """
-        names = [field.name for field in dataclasses.fields(self)]
-        for name, value in changes.items():
-            if name not in names and name not in PATHS:
-                allowed = f"no such field; the fields are {', '.join([*names, *PATHS])}"
-                raise UnknownFieldError(name, value, allowed)
-        fields = {name: value for name, value in changes.items() if name in names}
-        made = dataclasses.replace(self, **fields)
-        for name, value in changes.items():
-            if name not in names and value is not None:
-                made = made._with_shortcut(name, value)
-        return made
-
-    def _with_shortcut(self, name: str, value: Any) -> Self:
-        first, *path = PATHS[name]
-        group = self.controller_config if first == "controller" else getattr(self, first)
-        try:
-            group = _set(group, path, value)
-        except ConfigError as error:
-            raise type(error)(name, error.value, error.allowed) from None
-        return dataclasses.replace(self, **{first: group})
-
-    def value_of(self, name: str) -> Any:
-        """The value of a field or shortcut; of the controller its name."""
-        if name == "controller":
-            return self.controller_name
-        first, *path = path_to(name)
-        value = self.controller_config if first == "controller" else getattr(self, first)
-        for step in path:
-            value = getattr(value, step)
-        return value
-
     def for_controller(self, name: ControllerName) -> Self:
         """The same jump with the other controller at its own gains and rate."""
         if name == self.controller_name:
@@ -365,33 +355,36 @@ class JumpConfig:
         )
         return dataclasses.replace(self, controller=controller)
 
-    def with_options(self, options: Mapping[str, Any] | None) -> Self:
-        """The configuration of one episode: ``reset(options={"jump_height": ...})``.
+    def with_options(
+        self, options: Mapping[str, Any] | None
+    ) -> tuple[Self, tuple[float, ...] | None]:
+        """One episode: ``reset(options={"jump_height": ...})``, or ``"jump_heights"`` of each jump.
+
+        Returns:
+            Its configuration, and the commands of its jumps (m) if they are given one by one.
 
         Raises:
             ConfigError: If an option is unknown or out of range.
         """
+        allowed = "'jump_height' or 'jump_heights'"
         if options is None:
-            return self
-        if not isinstance(options, Mapping):
-            raise ConfigError("options", options, "a mapping with the key 'jump_height', or None")
+            return self, None
+        if not isinstance(options, Mapping) or len(options) > 1:
+            raise ConfigError("options", options, f"a mapping with the key {allowed}, or None")
         for name, value in options.items():
+            if name == "jump_heights":
+                heights = check_numbers(name, value, self.jumps, *JUMP_HEIGHT_RANGE, "m")
+                for height in heights:
+                    dataclasses.replace(self, jump_height=height)  # refuses what has no plan
+                return self, heights
             if name != "jump_height":
-                raise ConfigError(f"options[{name!r}]", value, "the only option is 'jump_height'")
-        return dataclasses.replace(self, **options)
+                raise ConfigError(f"options[{name!r}]", value, f"the only options are {allowed}")
+        return dataclasses.replace(self, **options), None
 
 
 _COMMON_FIELDS = [
     field for field in dataclasses.fields(ControllerConfig) if field.name != "frequency"
 ]
-
-
-def _set(group: Any, path: list[str], value: Any) -> Any:
-    """A group with another value at the end of the path into it."""
-    first, *rest = path
-    return dataclasses.replace(
-        group, **{first: _set(getattr(group, first), rest, value) if rest else value}
-    )
 
 
 def _check_heights(heights: Any) -> float | tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import gymnasium
@@ -13,13 +12,16 @@ from numpy.typing import NDArray
 from icub_jump_env import observation
 from icub_jump_env.checks import check_action, check_seed
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.control.jump import JumpController
+from icub_jump_env.control.jump import REST, JumpController
 from icub_jump_env.control.phases import Phase
 from icub_jump_env.control.qp.problem import IDLE, worse
 from icub_jump_env.estimation.estimator import Estimator
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
+from icub_jump_env.estimation.imu import ImuEstimator
 from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.metrics.jump import AIRBORNE_FORCE, JointLimits, JumpRecorder
+from icub_jump_env.metrics.jump import JointLimits
+from icub_jump_env.metrics.series import SeriesRecorder
+from icub_jump_env.planning.plan import JumpPlan
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot.collision import TOLERANCE
 from icub_jump_env.robot.frames import mujoco_qpos
@@ -29,12 +31,6 @@ from icub_jump_env.simulation.rendering import make_renderer
 from icub_jump_env.simulation.self_collision import SelfCollision
 from icub_jump_env.simulation.simulation import Simulation
 from icub_jump_env.snapshot import Snapshot
-
-FALLEN_TILT = math.radians(60.0)
-"""Chest tilt (rad) beyond which the robot has fallen."""
-
-TAKEOFF_GRACE = 0.5
-"""Time after T (s) within which the robot must have left the ground."""
 
 LOOK_PERIOD = 0.01
 """How often links are looked at that may be in each other (s)."""
@@ -47,7 +43,9 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     The controller of Bergonti, Fiorio and Pucci ("Torque and velocity controllers to
     perform jumps with a humanoid robot") launches the robot along a CoM trajectory
     scaled to the commanded height, retracts the feet in flight and holds a posture to
-    land. The baseline needs no agent: action zero is the pure controller, bit for bit.
+    land: v0. In v1 the launch follows whole-body plans, an IMU says where the robot is in the
+    air, and feedback places the feet and catches the landing. The baseline needs no agent:
+    action zero is the pure controller, bit for bit.
 
     ## Action space
     ``Box(-1, 1, (3,), float32)``: target offset of the CoM reference in units of
@@ -59,7 +57,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Observation space
     ``Box(-10, 10, (SIZE,), float32)``: sensor readings, estimates made of them, the
     command and the phase; entry by entry in :mod:`icub_jump_env.observation` and
-    docs/environment.md. No privileged state.
+    docs/environment.md. No privileged state. Times are those of the present jump.
 
     ## Rewards
     The sum of the ``reward_*`` entries of ``info``, see
@@ -71,17 +69,18 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     about +y.
 
     ## Episode end
+    With ``jumps`` above 1 the robot stands, crouches and jumps again, see docs/environment.md.
     Terminates on a fall (anything but the soles touches the floor, or the chest tilts
-    more than 60 deg), without take-off by T + 0.5 s, ``stand_time`` after touch-down,
-    or when the simulation diverges. ``info["outcome"]`` says which. The TimeLimit of
+    more than 60 deg), without take-off by T + 0.5 s, ``stand_time`` after the last
+    touch-down, or when the simulation diverges. ``info["outcome"]`` says which. The TimeLimit of
     the registration only guards.
 
     ## Info
     At reset, what was drawn: ``world`` (:class:`icub_jump_env.simulation.randomization.World`)
     and ``sensor_errors`` (bias and drift by kind of reading, and the force gain).
     Every step: ``jump`` (dict of :class:`icub_jump_env.metrics.jump.JumpMetrics`, final
-    at the end), ``is_success``, ``outcome``, ``phase``, ``time``, ``diverged``,
-    ``jump_height``, ``solver_status``, ``solver_primal_residual``,
+    at the end; of several jumps the present one), ``is_success`` (of all), with several jumps
+    ``jumps`` and ``series``, ``outcome``, ``phase``, ``time``, ``diverged``, ``jump_height``, ``solver_status``, ``solver_primal_residual``,
     ``solver_dual_residual``, ``solver_gap`` (of the step's worst control tick) and, from ``step``, the reward terms.
 
     ## Arguments
@@ -90,7 +89,9 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     {"jump_height": 0.05})`` overrides the command for one episode.
 
     ## Version history
-    v0: first version.
+    v1: the same with other defaults: ``planner="whole_body"``, ``estimator="imu"``,
+    ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.config.VERSIONS`).
+    v0: first version; the paper's jump. It stays as it is, whatever Gymnasium says of newer ones.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (declared so by Gymnasium)
@@ -123,6 +124,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 cfg.timestep,
                 visuals=self.render_mode is not None,
                 self_collision=cfg.self_collision,
+                blocks=cfg.randomization_config.blocks,
             ),
             cfg.actuator_config,
             cfg.sensor_config,
@@ -131,15 +133,25 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         )
         kinematics = FeetFixedKinematics(self.robot)
         self._estimator: Estimator = FeetFixedEstimator(kinematics)
-        self._recorder = JumpRecorder(self._joint_limits(), cfg.success.stand_time)
+        if cfg.estimator == "imu":
+            self._estimator = ImuEstimator(kinematics, cfg.control_dt)
+        robot = self.robot
+        limits = JointLimits(
+            robot.lower_position, robot.upper_position, robot.velocity_limit, robot.effort_limit
+        )
+        self._series = SeriesRecorder(cfg.jumps, limits, cfg.success)
+        self._recorder = self._series.present
         self._self_collision = SelfCollision(self.robot)
         self._next_look = 0.0
-        self._planner = cfg.make_planner(kinematics)
-        self._controller = JumpController(cfg.controller_config, cfg.residual, kinematics)
+        # Plans are made while the estimator uses its model, too.
+        self._planner = cfg.make_planner(FeetFixedKinematics(self.robot))
+        self._controller = JumpController(
+            cfg.controller_config, cfg.residual, kinematics, cfg.flight, cfg.landing
+        )
         self._residual_scale = np.array(cfg.residual.scale)
         self._state: RobotState
         self._start_com = np.zeros(3)
-        self._jump_height = math.nan
+        self._heights: tuple[float, ...] = ()
         self._outcome = "not reset"
         self._report = IDLE
         self._observation = np.zeros(observation.SIZE, np.float32)
@@ -168,7 +180,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         Args:
             seed: Seed of the environment's generator.
             options: ``{"jump_height": float}`` overrides the command (m) for this
-                episode.
+                episode, ``{"jump_heights": [...]}`` that of each jump.
 
         Returns:
             Observation and info.
@@ -176,17 +188,15 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ConfigError: If the seed or an option is unknown or out of range.
         """
-        episode = self.config.with_options(options)
+        episode, heights = self.config.with_options(options)
         super().reset(seed=check_seed(seed))
-        self._jump_height = episode.draw_height(self.np_random)
-        plan = self._planner.plan(self._jump_height)
+        self._heights = heights or episode.draw_heights(self.np_random)
+        plan = self._planner.plan(self._heights[0])
         simulation, stance = self._simulation, plan.stance
         qpos = mujoco_qpos(stance.configuration)
         simulation.reset(self.np_random, qpos, stance.torque, plan.duration)
-        self._sense()
-        self._start_com[:] = self._state.com
-        self._controller.start(plan, self._state, simulation.physics.data.time)
-        self._recorder.reset()
+        self._series.reset()
+        self._begin_jump(plan)
         self._next_look = 0.0
         self._outcome = "running"
         self._report = IDLE
@@ -217,20 +227,15 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             action64 = np.zeros(3)  # has no effect and costs nothing
         target = action64 * self._residual_scale
         self._report = IDLE
-        already_over = self._outcome != "running"
+        already_over, before = self._outcome != "running", len(self._series.jumps)
         for _ in range(self.config.controls_per_step):
             if self._outcome == "running":
                 self._control_tick(target)
         terminated = self._outcome != "running"
         if self._outcome != "diverged":
             self._observe()
-        terms = reward_terms(
-            self._recorder.metrics,
-            self._jump_height,
-            action64,
-            ends=terminated and not already_over,
-            weights=self.config.reward,
-        )
+        ended = self._series.jumps[before - 1 : None if terminated else -1]
+        terms = reward_terms([] if already_over else ended, action64, self.config.reward)
         if self.render_mode == "human":
             self.render()
         reward = sum(terms.values())
@@ -278,7 +283,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         # The believed state is made of views of the model, which a copy fills anew.
-        self._state = self._estimator.estimate(self._simulation.sensors.readings)
+        self._state = self._estimator.refresh(self._simulation.sensors.readings)
         self._renderer = make_renderer(self._simulation.physics, self.config.rendering)
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
@@ -297,12 +302,29 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             if physics.diverged:
                 self._outcome = "diverged"
                 return
-            self._recorder.update(simulation.truth.read())
-            self._outcome = self._judge()
+            truth = simulation.truth.read()
+            self._recorder.update(truth)
+            self._outcome = self._series.judge(truth, self._controller.plan.duration)
             if self._outcome != "running":
                 break
         self._look_for_overlap()
+        following = self._controller.due(physics.data.time)
+        if following is None or self._outcome != "running":
+            self._sense()
+        else:
+            self._begin_jump(following)
+
+    def _begin_jump(self, plan: JumpPlan) -> None:
+        """A jump begins; the robot stands at rest in its crouch."""
+        time, begun = self._simulation.physics.data.time, len(self._series.jumps)
+        height, *more = self._heights[begun:]
+        rest = REST if more else None
+        self._series.begin(height, self._simulation.truth.state, time, rest)
+        self._estimator.reset()
         self._sense()
+        self._start_com[:] = self._state.com
+        following = self._planner.plan(more[0]) if more else None
+        self._controller.start(plan, self._state, time, following)
 
     def _look_for_overlap(self) -> None:
         data = self._simulation.physics.data
@@ -316,28 +338,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """From readings to the believed state, once per control tick."""
         self._state = self._estimator.estimate(self._simulation.sense())
 
-    def _judge(self) -> str:
-        truth = self._simulation.truth.state
-        if not truth.only_feet_touch or truth.chest_tilt > FALLEN_TILT:
-            return "fell"
-        if self._recorder.stood:
-            return "stood"
-        airborne = truth.ground_force < AIRBORNE_FORCE
-        deadline = self._controller.plan.duration + TAKEOFF_GRACE
-        if (
-            truth.time >= deadline
-            and not airborne
-            and math.isnan(self._recorder.metrics.takeoff_time)
-        ):
-            return "no take-off"
-        return "running"
-
-    def _joint_limits(self) -> JointLimits:
-        robot = self.robot
-        return JointLimits(
-            robot.lower_position, robot.upper_position, robot.velocity_limit, robot.effort_limit
-        )
-
     def _observe(self) -> None:
         readings, state = self._simulation.sensors.readings, self._state
         controller, episode_time = self._controller, self._simulation.physics.data.time
@@ -349,11 +349,11 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if controller.launching:
             controller.reference.update(jump_time)
             com_error = state.com - controller.reference.setpoint.com_position
-        values = {
+        values: dict[str, NDArray[np.float64] | float] = {
             "phase": one_hot,
             "launch_progress": min(1.0, jump_time / plan.duration),
-            "time": episode_time,
-            "jump_height": self._jump_height,
+            "time": jump_time,
+            "jump_height": self._series.jumps[-1].height,
             "com_displacement": plan.displacement,
             "takeoff_time": plan.duration,
             "joint_position": readings.joint_position - self.robot.crouch,
@@ -371,15 +371,23 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._observation = observation.encode(values)
 
     def _info(self) -> dict[str, Any]:
-        metrics, report = self._recorder.metrics, self._report
-        return {
-            "jump": metrics.as_dict(),
-            "is_success": metrics.is_success(self._jump_height, self.config.success),
+        series, jumps, report = self._series, self._series.jumps, self._report
+        together = (
+            {}
+            if self.config.jumps == 1
+            else {
+                "jumps": tuple(jump.metrics.as_dict() for jump in jumps),
+                "series": series.as_dict(self._simulation.truth.state),
+            }
+        )
+        return together | {
+            "jump": jumps[-1].metrics.as_dict(),
+            "is_success": series.is_success,
             "outcome": self._outcome,
             "diverged": self._outcome == "diverged",
             "phase": self._controller.phases.phase.name.lower(),
             "time": float(self._simulation.physics.data.time),
-            "jump_height": self._jump_height,
+            "jump_height": jumps[-1].height,
             "solver_status": str(report.status),
             "solver_primal_residual": report.residuals.primal,
             "solver_dual_residual": report.residuals.dual,

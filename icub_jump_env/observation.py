@@ -47,12 +47,12 @@ BLOCKS: tuple[Block, ...] = (
     Block(
         "launch_progress",
         ("",),
-        "time since the start / take-off time T, at most 1",
+        "time since the start of the jump / take-off time T, at most 1",
         "-",
         "-",
         1.0,
     ),
-    Block("time", ("",), "time since the start", "s", "-", 1.0),
+    Block("time", ("",), "time since the start of the jump", "s", "-", 1.0),
     Block("jump_height", ("",), "commanded rise in flight", "m", "-", 0.05),
     Block("com_displacement", ("",), "planned CoM rise in the launch", "m", "-", 0.1),
     Block("takeoff_time", ("",), "planned take-off time T", "s", "-", 0.5),
@@ -60,7 +60,9 @@ BLOCKS: tuple[Block, ...] = (
     Block("joint_velocity", JOINT_NAMES, "encoder velocity", "rad/s", "joint", 5.0),
     Block("gravity", _XYZ, "direction of gravity (IMU)", "-", "base, x forward", 1.0),
     Block("gyro", _XYZ, "angular velocity of the base (IMU)", "rad/s", "base, x forward", 2.0),
-    Block("com_offset", _XYZ, "estimated CoM minus CoM at the start", "m", "world", 0.1),
+    Block(
+        "com_offset", _XYZ, "estimated CoM minus CoM at the start of the jump", "m", "world", 0.1
+    ),
     Block("com_velocity", _XYZ, "estimated CoM velocity", "m/s", "world", 1.0),
     Block(
         "angular_momentum", _XYZ, "estimated centroidal angular momentum", "kg m^2/s", "world", 1.0

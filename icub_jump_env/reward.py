@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_number, store
-from icub_jump_env.metrics.jump import JumpMetrics
+from icub_jump_env.metrics.series import Jump
 
 
 @dataclass(frozen=True)
@@ -40,36 +41,31 @@ class RewardConfig:
 
 
 def reward_terms(
-    metrics: JumpMetrics,
-    jump_height: float,
-    action: NDArray[np.float64],
-    ends: bool,
-    weights: RewardConfig,
+    ended: Iterable[Jump], action: NDArray[np.float64], weights: RewardConfig
 ) -> dict[str, float]:
     """The named reward terms.
 
-    Three terms come with the last step of an episode: ``reward_landed`` (for a robot that
+    Three terms come with the last step of a jump: ``reward_landed`` (for a robot that
     landed and stands), ``reward_height`` (for a flight of the commanded height, less in
     proportion to the distance from it, at least 0) and ``reward_rotation`` (minus the
     weighted flight rotation, at least -1). ``reward_residual`` charges each step in which the residual acts for its size.
 
     Args:
-        metrics: Metrics so far.
-        jump_height: Commanded height (m).
+        ended: The jumps that ended with this step.
         action: (3,) action in [-1, 1].
-        ends: Whether the episode ended with this step.
         weights: Weights of the terms.
 
     Returns:
         Term by name.
     """
     landed = height = rotation = 0.0
-    if ends:
-        landed = weights.landed * metrics.landed
-        error = abs(metrics.flight_height - jump_height) / jump_height
-        height = weights.height * max(0.0, 1.0 - error)
+    for jump in ended:
+        metrics = jump.metrics
+        landed += weights.landed * metrics.landed
+        error = abs(metrics.flight_height - jump.height) / jump.height
+        height += weights.height * max(0.0, 1.0 - error)
         if not math.isnan(metrics.flight_rotation):
-            rotation = -min(1.0, weights.rotation * abs(metrics.flight_rotation))
+            rotation -= min(1.0, weights.rotation * abs(metrics.flight_rotation))
     return {
         "reward_landed": float(landed),
         "reward_height": float(height),

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any, Self
 
 from icub_jump_env.control.config import Constraints, LaunchEnd, SolverName
+from icub_jump_env.errors import ConfigError, UnknownFieldError
 from icub_jump_env.planning.residual import ResidualPhases
 from icub_jump_env.simulation.render_config import CameraName, RenderMode
 
@@ -73,3 +77,74 @@ into it."""
 def path_to(name: str) -> tuple[str, ...]:
     """The way to a field or to what a shortcut stands for, from :class:`JumpConfig` on."""
     return PATHS.get(name, (name,))
+
+
+@dataclass(frozen=True)
+class WithShortcuts(ABC):
+    """A configuration whose :class:`Shortcuts` can be given and read like its fields."""
+
+    @property
+    @abstractmethod
+    def controller_config(self) -> Any:
+        """The controller, by name or as given."""
+
+    @property
+    @abstractmethod
+    def controller_name(self) -> str:
+        """Name of the controller."""
+
+    @classmethod
+    def of(cls, **keywords: Any) -> Self:
+        """Build from fields and shortcuts.
+
+        Raises:
+            UnknownFieldError: If a keyword is neither.
+            ConfigError: If a value is out of range.
+        """
+        return cls().replace(**keywords)
+
+    def replace(self, **changes: Any) -> Self:
+        """The same with other fields or shortcuts.
+
+        Raises:
+            UnknownFieldError: If a keyword is neither.
+            ConfigError: If a value is out of range.
+        """
+        names = [field.name for field in dataclasses.fields(self)]
+        for name, value in changes.items():
+            if name not in names and name not in PATHS:
+                allowed = f"no such field; the fields are {', '.join([*names, *PATHS])}"
+                raise UnknownFieldError(name, value, allowed)
+        fields = {name: value for name, value in changes.items() if name in names}
+        made = dataclasses.replace(self, **fields)
+        for name, value in changes.items():
+            if name not in names and value is not None:
+                made = made._with_shortcut(name, value)
+        return made
+
+    def _with_shortcut(self, name: str, value: Any) -> Self:
+        first, *path = PATHS[name]
+        group = self.controller_config if first == "controller" else getattr(self, first)
+        try:
+            group = _set(group, path, value)
+        except ConfigError as error:
+            raise type(error)(name, error.value, error.allowed) from None
+        return dataclasses.replace(self, **{first: group})
+
+    def value_of(self, name: str) -> Any:
+        """The value of a field or shortcut; of the controller its name."""
+        if name == "controller":
+            return self.controller_name
+        first, *path = path_to(name)
+        value = self.controller_config if first == "controller" else getattr(self, first)
+        for step in path:
+            value = getattr(value, step)
+        return value
+
+
+def _set(group: Any, path: list[str], value: Any) -> Any:
+    """A group with another value at the end of the path into it."""
+    first, *rest = path
+    return dataclasses.replace(
+        group, **{first: _set(getattr(group, first), rest, value) if rest else value}
+    )

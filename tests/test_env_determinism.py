@@ -93,6 +93,9 @@ class TestNominalWorld:
         np.testing.assert_array_equal(states[0], states[2])
 
 
+FEEDBACK = {"estimator": "imu", "flight": "feedback", "landing": "feedback"}
+
+
 def pickled(env):
     return pickle.loads(pickle.dumps(env))
 
@@ -110,6 +113,12 @@ def pickled(env):
                 {"robot": "iCubGenova02", "solver": "osqp"},
             )
             for moment in ((20, pickled), (40, copy.deepcopy), (50, pickled))
+        ),
+        # In the first crouch, and in the second launch.
+        *(
+            ({"jumps": 2, **config}, *moment)
+            for config in ({}, {"controller": "torque", **FEEDBACK})
+            for moment in ((150, pickled), (185, copy.deepcopy), (220, pickled))
         ),
     ],
     ids=lambda value: getattr(value, "__name__", str(value)),

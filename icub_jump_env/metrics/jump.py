@@ -80,7 +80,8 @@ class JumpMetrics:
     """Result of one jump, plain floats and bools in SI units; NaN where undefined.
 
     Attributes:
-        takeoff_time: Last loss of ground contact before the apex (s).
+        takeoff_time: Last loss of ground contact before the apex, since the start of the jump
+            (s).
         takeoff_velocity: Vertical CoM velocity then (m/s).
         ballistic_height: takeoff_velocity^2 / 2g (m).
         flight_time: Time from take-off to the first contact after the apex (s); 0
@@ -94,7 +95,7 @@ class JumpMetrics:
         base_pitch_range: Largest minus smallest base pitch in flight (rad).
         angular_momentum_takeoff: Angular momentum about the CoM at take-off, world
             axes (kg m^2/s).
-        peak_ground_force: Largest vertical ground force of the episode (N).
+        peak_ground_force: Largest vertical ground force of the jump (N).
         landing_force: Largest vertical ground force after touch-down (N).
         joint_work: Mechanical work of the joints, counted positive also where they brake
             (J).
@@ -104,7 +105,9 @@ class JumpMetrics:
         chest_lean: Forward and leftward lean of the chest at the end (rad), in the sagittal and
             the frontal plane.
         landed: Whether, ``stand_time`` after touch-down, only the feet have touched the
-            ground and the chest is within 30 deg of upright.
+            ground and the chest is within 30 deg of upright. Where another jump follows: that
+            long before the next crouch, which leans as far, and nothing else touched until its
+            launch.
         solver_failures: Control ticks whose QP solution was not applied.
         limit_violations: Physics steps with a joint beyond 1.03 x its speed limit, or
             beyond its torque or position limit.
@@ -183,6 +186,8 @@ class JumpRecorder:
         metrics: The metrics so far; of the flights, those of the highest one.
         flights: All flights of at least 20 ms so far, in time.
         touchdown_time: First contact after the apex (s); NaN before.
+
+    Times are those since the start of the jump.
     """
 
     def __init__(self, limits: JointLimits, stand_time: float) -> None:
@@ -200,9 +205,15 @@ class JumpRecorder:
         self._stand_time = stand_time
         self.reset()
 
-    def reset(self) -> None:
-        """Forget everything."""
+    def reset(self, start: float = 0.0, rest: float | None = None) -> None:
+        """Forget everything; a jump begins.
+
+        Args:
+            start: Time since the start of the episode (s).
+            rest: Instead of ``stand_time``, if another jump follows (s).
+        """
         self.metrics = JumpMetrics()
+        self._start, self._rest, self._has_landed = start, rest, False
         self.touchdown_time = math.nan
         self.flights: list[Flight] = []
         self._flight: Flight | None = None
@@ -213,17 +224,17 @@ class JumpRecorder:
 
     @property
     def stood(self) -> bool:
-        """Whether ``stand_time`` has passed since touch-down."""
+        """Whether ``stand_time`` has passed since touch-down, or the rest."""
+        least = self._stand_time if self._rest is None else self._rest
         return bool(
-            self._last_time is not None
-            and (self._last_time - self.touchdown_time >= self._stand_time - 1e-9)
+            self._last_time is not None and (self._last_time - self.touchdown_time >= least - 1e-9)
         )
 
     def update(self, state: TrueState) -> None:
         """Take in the true state of one physics step."""
-        metrics = self.metrics
-        dt = 0.0 if self._last_time is None else state.time - self._last_time
-        self._last_time = state.time
+        metrics, time = self.metrics, state.time - self._start
+        dt = 0.0 if self._last_time is None else time - self._last_time
+        self._last_time = time
         if state.ground_force > metrics.peak_ground_force:
             metrics.peak_ground_force = state.ground_force
         self._only_feet = self._only_feet and state.only_feet_touch
@@ -235,17 +246,22 @@ class JumpRecorder:
         upright = state.chest_tilt < LANDED_TILT
         if state.ground_force < AIRBORNE_FORCE:
             if self._flight is None:
-                self._flight = _take_off(state)
-            self._fly(self._flight, state, dt)
+                self._flight = _take_off(state, time)
+            self._fly(self._flight, state, time, dt)
         elif self._flight is not None:
-            self._touch_down(self._flight, state.time)
+            self._touch_down(self._flight, time)
         elif upright:
             self._slip(state)
-        if state.time >= self.touchdown_time:
+        if time >= self.touchdown_time:
             metrics.landing_force = max(metrics.landing_force, state.ground_force)
         x, y, z = state.chest_up
         metrics.chest_lean = math.atan2(x, z), math.atan2(y, z)
         metrics.landed = self._only_feet and self.stood and upright
+        self._has_landed = self._has_landed or metrics.landed
+
+    def conclude(self) -> None:
+        """Another jump begins: who stood upright and has not fallen since has landed."""
+        self.metrics.landed = self._has_landed and self._only_feet
 
     def _slip(self, state: TrueState) -> None:
         if self._footholds is None:
@@ -263,10 +279,10 @@ class JumpRecorder:
             or (state.joint_position > self._upper).any()
         )
 
-    def _fly(self, flight: Flight, state: TrueState, dt: float) -> None:
+    def _fly(self, flight: Flight, state: TrueState, time: float, dt: float) -> None:
         locked_velocity = np.linalg.solve(state.locked_inertia, state.angular_momentum)
         flight.rotation += float(locked_velocity[1]) * dt
-        flight.duration = state.time - flight.time
+        flight.duration = time - flight.time
         flight.apex = max(flight.apex, float(state.com[2]))
         flight.sole = max(flight.sole, state.sole_height)
         flight.pitch_low = min(flight.pitch_low, state.base_pitch)
@@ -304,10 +320,10 @@ class JumpRecorder:
         self._flight = None
 
 
-def _take_off(state: TrueState) -> Flight:
+def _take_off(state: TrueState, time: float) -> Flight:
     x, y, z = (float(h) for h in state.angular_momentum)
     return Flight(
-        time=state.time,
+        time=time,
         height=float(state.com[2]),
         velocity=float(state.com_velocity[2]),
         momentum=(x, y, z),

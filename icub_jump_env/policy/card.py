@@ -35,6 +35,9 @@ TASK_FIELDS = (
     "robot",
     "controller",
     "planner",
+    "estimator",
+    "flight",
+    "landing",
     "com_displacement",
     "com_scaling",
     "momentum_control",
@@ -52,6 +55,15 @@ and to be tried on other actuators, sensors and worlds; solver and physics step 
 exactly the same is computed; rendering and ``stand_time`` do not reach it. Of a controller of
 the same name, all but the solver must agree: gains, weights, limits, when phases end.
 """
+
+BEFORE_THERE_WAS_A_CHOICE = {
+    "robot": DEFAULT_MODEL,
+    "planner": "scaled_curve",
+    "estimator": "feet_fixed",
+    "flight": "minimum_jerk",
+    "landing": "hold",
+}
+"""What holds for cards that do not say these fields."""
 
 _CONTROLLER_FREE = ("solver", "frequency", "momentum_control")
 """Fields of a controller that may differ, or are task fields by themselves."""
@@ -178,9 +190,8 @@ def _check_config(config: Any) -> JumpConfig:
     if isinstance(config, JumpConfig):
         return config
     given = check_mapping("config", config)
-    # What it was before there was a choice.
     implied = {} if "residual" in given else {"residual_bandwidth": 15.0}
-    explicit = {"robot": DEFAULT_MODEL, "planner": "scaled_curve", **implied, **given}
+    explicit = BEFORE_THERE_WAS_A_CHOICE | implied | dict(given)
     checked = JumpConfig.of(**explicit)
     for field in TASK_FIELDS:
         # Else the policy would change with the default.

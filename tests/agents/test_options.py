@@ -108,6 +108,7 @@ def test_a_missing_file_is_refused(tmp_path):
             {"env": JumpConfig.of(render_mode="rgb_array")},
             "render_mode='rgb_array' is not allowed",
         ),
+        ({"env": JumpConfig(jumps=2)}, "jumps=2 is not allowed: 1 in a training"),
     ],
 )
 def test_a_value_out_of_range_is_refused(changes, message):

@@ -388,3 +388,35 @@ def test_lean_is_that_of_the_end():
     stand(recorder, 0.0, 0.1, chest_up=leaning(40.0, 10.0))
     stand(recorder, 0.1, 0.1, chest_up=leaning(-20.0, 5.0))
     np.testing.assert_allclose(np.degrees(recorder.metrics.chest_lean), [-20.0, 5.0])
+
+
+class TestAJumpThatAnotherFollows:
+    def recorder(self, began=7.0):
+        recorder = JumpRecorder(LIMITS, 2.0)
+        recorder.reset(began, rest=0.5)
+        self.landing = ballistic(recorder, stand(recorder, began, 0.4), 0.886)
+        return recorder
+
+    def test_its_times_are_those_since_its_start(self):
+        recorder, alone = self.recorder(), JumpRecorder(LIMITS, 2.0)
+        ballistic(alone, stand(alone, 0.0, 0.4), 0.886)
+        assert recorder.metrics.takeoff_time == pytest.approx(0.4)
+        assert recorder.metrics.flight_time == pytest.approx(alone.metrics.flight_time)
+        stand(recorder, self.landing, 0.1)
+        assert recorder.touchdown_time == pytest.approx(self.landing - 7.0)
+
+    @pytest.mark.parametrize(
+        ("rested", "crouched", "landed"),
+        [
+            ({}, {"chest_up": leaning(31.0)}, True),
+            ({"chest_up": leaning(31.0)}, {"chest_up": leaning(31.0)}, False),
+            ({}, {"only_feet_touch": False}, False),
+            ({"only_feet_touch": False}, {}, False),
+        ],
+    )
+    def test_it_landed_if_it_stood_before_it_crouched(self, rested, crouched, landed):
+        recorder = self.recorder()
+        now = stand(recorder, self.landing, 0.51, **rested)
+        stand(recorder, now, 0.9, **crouched)
+        recorder.conclude()
+        assert recorder.metrics.landed is landed

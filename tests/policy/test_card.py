@@ -17,7 +17,7 @@ from icub_jump_env.control.config import PhaseConfig, VelocityConfig
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import PolicyCard, check_match
-from icub_jump_env.policy.card import TASK_FIELDS, mismatches
+from icub_jump_env.policy.card import BEFORE_THERE_WAS_A_CHOICE, TASK_FIELDS, mismatches
 from icub_jump_env.shortcuts import Shortcuts, path_to
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
 from icub_jump_env.simulation.actuators.motors import DCMotor
@@ -179,6 +179,9 @@ OTHERS = {
     "residual_bandwidth": 20.0,
     "controller": "torque",
     "planner": "whole_body",
+    "estimator": "imu",
+    "flight": "feedback",
+    "landing": "feedback",
     "com_displacement": 0.1,
     "com_scaling": "acceleration",
     "momentum_control": False,
@@ -196,12 +199,13 @@ ALONE = ("com_scaling", "planner")
 @pytest.mark.parametrize("field", TASK_FIELDS)
 def test_each_field_of_the_task_must_match(field):
     card = make_card()
-    other = JumpConfig.of(**{field: OTHERS[field]})
+    needed = {"estimator": "imu"} if field in ("flight", "landing") else {}
+    other = JumpConfig.of(**{field: OTHERS[field]}, **needed)
     found = mismatches(card, other)
     trained = JumpConfig().value_of(field)
     assert (field, trained, OTHERS[field]) in found
     # The default rate depends on the controller.
-    assert {name for name, _, _ in found} <= {field, "control_frequency"}
+    assert {name for name, _, _ in found} <= {field, "control_frequency", *needed}
     with pytest.raises(PolicyMismatchError, match=field) as error:
         check_match(card, other)
     assert repr(trained) in str(error.value)
@@ -255,7 +259,7 @@ def test_the_controller_must_be_the_one_of_the_training(controller, field):
 def test_the_fields_are_sorted_into_two_kinds_with_none_forgotten():
     """A new field of the configuration must be sorted, too."""
     free = {
-        "jump_height", "plans", "solver", "timestep", "self_collision", "actuators", "sensors",
+        "jump_height", "jumps", "plans", "solver", "timestep", "self_collision", "actuators", "sensors",
         "command_delay", "randomization", "reward", "success", "stand_time", "rendering",
         "render_mode", "width", "height", "camera", "residual",
     }  # fmt: skip
@@ -278,7 +282,7 @@ def test_the_layout_must_match_by_name():
 
 
 @pytest.mark.parametrize(
-    "field", [name for name in TASK_FIELDS if name not in ("robot", "planner")]
+    "field", [name for name in TASK_FIELDS if name not in BEFORE_THERE_WAS_A_CHOICE]
 )
 def test_a_card_says_every_field_that_the_policy_depends_on(field):
     content = make_card(config=JumpConfig.of(momentum_control=False)).as_dict()
