@@ -12,12 +12,12 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn, TypeVar, get_args
+from typing import Any, NoReturn, TypeVar, cast, get_args
 
 import tyro
 from rich.console import Console
 
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import VERSIONS, EnvName, JumpConfig
 from icub_jump_env.errors import ICubJumpError, PolicyMismatchError, one_line, shown
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.files import read_json
@@ -122,7 +122,7 @@ def evaluate(arguments: Sequence[str]) -> None:
 
 
 def _evaluate(arguments: Sequence[str]) -> None:
-    options = parse(EvalOptions, arguments, _as_trained(arguments))
+    options = parse(EvalOptions, arguments, _defaults(arguments))
     import_mujoco()
     # Imported here, like the modes, so that --help and bad arguments answer at once.
     from icub_jump_env.evaluation.report.output import check_writable, say
@@ -158,18 +158,24 @@ def _evaluate(arguments: Sequence[str]) -> None:
         say(progress, f"wrote {options.video}")
 
 
-def _as_trained(arguments: Sequence[str]) -> EvalOptions | None:
-    """The jump that the policies of a command line were trained for, if there are any."""
-    found = seek(arguments, "compare", "policy")
+def _defaults(arguments: Sequence[str]) -> EvalOptions:
+    """What holds where a command line says nothing, if that is not the usual.
+
+    The defaults of the environment that it names, and what its policies were trained for.
+    """
+    found = seek(arguments, "env", "compare", "policy")
+    env = found.pop("env", ["ICubJump-v0"])[0]
+    config = JumpConfig.of(**VERSIONS.get(cast("EnvName", env), {}))
+    options = EvalOptions(config=config)
     if not found:
-        return None
+        return options
     from icub_jump_env.evaluation.episodes.contender import as_trained, read_contenders
 
     contenders = read_contenders(found.get("compare") or found["policy"])
     cards = [contender.card for contender in contenders if contender.card is not None]
     if not cards:
-        return None
-    config = as_trained(cards[0], JumpConfig())
+        return options
+    config = as_trained(cards[0], config)
     if "compare" in found:
         config = dataclasses.replace(config, jump_height=cards[0].config.jump_height)
         # A range of commands is for this mode alone.

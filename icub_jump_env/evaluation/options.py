@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import tyro
 
 from icub_jump_env.checks import check_count, store
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import EnvName, JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.shortcuts import Shortcuts
 
@@ -19,12 +19,13 @@ STUDY_EPISODES = 20
 MOST_EPISODES = 1_000_000
 
 _MODES = ("compare", "study", "sweep", "max_height", "report", "view")
-_COMMON = ("config", "shortcuts", "seed")
+_COMMON = ("env", "config", "shortcuts", "seed")
 _USED = {
     "nominal": ("episodes", "policy", "json", "plot", "video"),
     "statistics": ("episodes", "policy", "jobs", "results", "resume", "json", "plot", "video"),
     "compare": ("episodes", "jobs", "resume", "json", "plot"),
     "study": ("episodes", "jobs", "json", "plot"),
+    "landing_study": ("episodes", "jobs", "resume", "json", "plot"),
     "sweep": ("jobs", "json", "plot"),
     "max_height": ("jobs", "json"),
     "report": (),
@@ -34,10 +35,14 @@ _USED = {
 
 _CHOSEN_BY_MODE = {
     "study": ("controller",),
+    "landing_study": (
+        "controller", "estimator", "flight", "landing",
+        "jump_height", "com_displacement", "planner", "randomization", "sensors",
+    ),
     "sweep": ("controller", "jump_height", "com_displacement", "randomization"),
     "max_height": ("jump_height", "com_displacement", "randomization"),
     "report": ("controller",),
-}
+}  # fmt: skip
 """Fields of the configuration that a mode sets itself."""
 
 
@@ -52,13 +57,15 @@ class EvalOptions:
     Attributes:
         config: The jump; every field of the environment's configuration is a flag.
         shortcuts: Fields inside its groups; they end up there.
+        env: Whose defaults hold: the paper's jump (v0), or the strongest settings (v1).
         episodes: Number of episodes; in a study, of each case (default 20).
         seed: Seed of the first episode; the next ones count up.
         policy: Let this policy act; the jump is set up as its card says.
         compare: Compare policies on the same episodes: files, and the word baseline.
         jobs: Processes that work in parallel.
         study: What changes the jump: the realism of actuators and sensors, the task as cost or
-            constraint, what ends the launch, the robot.
+            constraint, what ends the launch, the robot; how flight and landing are controlled,
+            under disturbances of several sizes.
         sweep: Desired height against displacement, for both controllers.
         max_height: The highest whole-body plan and the highest jump that stands, for both
             controllers, with what binds.
@@ -77,12 +84,13 @@ class EvalOptions:
 
     config: Annotated[JumpConfig, tyro.conf.arg(name="")] = field(default_factory=JumpConfig)
     shortcuts: Annotated[Shortcuts, tyro.conf.arg(name="")] = field(default_factory=Shortcuts)
+    env: EnvName = "ICubJump-v0"
     episodes: int | None = None
     seed: int = 0
     policy: Path | None = None
     compare: tuple[str, ...] | None = None
     jobs: int = 1
-    study: Literal["realism", "constraints", "launch_end", "robots"] | None = None
+    study: Literal["realism", "constraints", "launch_end", "robots", "landing"] | None = None
     sweep: bool = False
     max_height: bool = False
     report: Path | None = None
@@ -109,6 +117,11 @@ class EvalOptions:
             raise ConfigError(
                 "jump_height", self.config.jump_height, f"one height with {_flag(self.mode)}"
             )
+        if self.config.jumps > 1:
+            if self.mode not in ("nominal", "statistics", "view"):
+                raise ConfigError("jumps", self.config.jumps, f"1 with {_flag(self.mode)}")
+            if self.plot is not None:
+                raise ConfigError("jumps", self.config.jumps, "1 with --plot")
         outputs = [
             path.resolve()
             for name in ("json", "results", "plot", "video")
@@ -137,6 +150,8 @@ class EvalOptions:
     @property
     def mode(self) -> str:
         """Which of eval.py's modes is meant."""
+        if self.study == "landing":
+            return "landing_study"
         for mode in _MODES:
             if getattr(self, mode):
                 return mode
@@ -148,4 +163,6 @@ class EvalOptions:
 
 
 def _flag(mode: str) -> str:
+    if mode == "landing_study":
+        return "--study landing"
     return f"--{mode.replace('_', '-')}"

@@ -183,6 +183,10 @@ def test_models_are_given_by_name_or_json():
         (["--report", "r", "--json", "a.json"], ["json", "--report"]),
         (["--view", "--episodes", "3"], ["episodes", "--view"]),
         (["--study", "realism", "--resume"], ["resume", "--study"]),
+        (["--study", "landing", "--estimator", "imu"], ["estimator", "--study landing"]),
+        (["--landing", "feedback"], ["landing", "estimator='imu'"]),
+        (["--study", "landing", "--randomization", "hard"], ["randomization", "--study landing"]),
+        (["--study", "landing", "--video", "a.mp4"], ["video", "--study landing"]),
         (["--sweep", "--jump-height", "0.05"], ["jump_height", "--sweep"]),
         (["--study", "realism", "--sensors", "realistic"], ["sensors", "--study"]),
         (["--report", "r", "--controller", "torque"], ["controller", "--report"]),
@@ -367,3 +371,17 @@ def test_eval_py_runs_from_anywhere(tmp_path):
     )  # fmt: skip
     assert result.returncode == 2
     assert result.stderr == "error: jump_height=9.0 is not allowed: a number from 0.01 to 0.15 m\n"
+
+
+class TestSeveralJumps:
+    @pytest.mark.parametrize("arguments", [[], ["--randomization", "full", "--episodes", "2"]])
+    def test_says_how_many_landed_in_a_row(self, capsys, arguments):
+        code, out, _ = evaluate(capsys, "--jumps", "2", "--stand-time", "0.1", *arguments)
+        assert code == 0
+        assert "jumps landed in a row: 2 of 2; complete series: 100.0 % (2 of 2;" in out
+
+    @pytest.mark.parametrize("mode", [["--sweep"], ["--study", "realism"], ["--plot", "folder"]])
+    def test_is_refused_where_one_is_meant(self, capsys, mode):
+        code, _, err = evaluate(capsys, "--jumps", "2", *mode)
+        assert code == 2
+        assert "jumps=2 is not allowed: 1 with" in err

@@ -10,6 +10,7 @@ from scipy.stats import binom, multinomial
 
 from icub_jump_env.evaluation.statistics.difference import (
     Difference,
+    RateDifference,
     bootstrap_interval,
     holm_corrected,
     in_words,
@@ -90,6 +91,33 @@ class TestDifference:
     def test_of_a_single_pair_there_is_nothing_but_its_values(self):
         line = str(Difference.of(self.ours[:1], self.theirs[:1]))
         assert line == ("success +100.0 points, rise +0.30 cm, soles +0.00 cm (a single episode)")
+
+
+def landed(episode):
+    return episode.jump["landed"]
+
+
+class TestRateDifference:
+    def test_counts_what_it_is_told_to_count(self):
+        """Too low is no success, but it stands."""
+        ours, theirs = outcomes("11110", landed=True), outcomes("00001", landed=False)
+        found = RateDifference.of(ours, theirs, landed)
+        assert (found.won, found.lost, found.pairs, found.gain) == (5, 0, 5, 1.0)
+        assert found.p_value == pytest.approx(2 / 2**5)
+        assert found.interval == paired_interval(5, 0, 5)
+
+    @pytest.mark.parametrize(
+        ("ours", "theirs", "sign"),
+        [("1" * 20, "0" * 20, 1), ("0" * 20, "1" * 20, -1), ("10" * 10, "01" * 10, 0)],
+    )
+    def test_sign_is_the_side_of_zero_that_the_interval_lies_on(self, ours, theirs, sign):
+        assert RateDifference.of(outcomes(ours), outcomes(theirs), landed).sign == sign
+
+    def test_agrees_with_the_success_of_a_difference(self):
+        ours, theirs = TestDifference.ours, TestDifference.theirs
+        rate, whole = RateDifference.of(ours, theirs, landed), Difference.of(ours, theirs)
+        assert (rate.won, rate.lost, rate.p_value) == (whole.won, whole.lost, whole.p_value)
+        assert (rate.gain, rate.interval) == (whole.success, whole.success_interval)
 
 
 class TestHolm:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
+from icub_jump_env.evaluation.episodes.failures import Failure, failure_in, failure_of
 from icub_jump_env.metrics.jump import SuccessConfig
 
 GOOD = {
@@ -49,3 +49,30 @@ def test_classes(outcome, changes, failure):
 )
 def test_what_counts_as_a_success_is_configured(success, failure):
     assert failure_of("stood", GOOD, 0.04, success) is failure
+
+
+def several(*jumps, outcome="stood", success=True):
+    """The info of a series of two jumps."""
+    return {
+        "outcome": outcome, "is_success": success, "jump": jumps[-1], "jumps": jumps,
+        "jump_height": 0.04, "series": {"jump_heights": (0.04,) * len(jumps)},
+    }  # fmt: skip
+
+
+LOW = GOOD | {"flight_height": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("info", "failure"),
+    [
+        (several(GOOD, GOOD), None),
+        (several(LOW, GOOD, success=False), Failure.TOO_LOW),
+        (several(LOW, GOOD | FELL, outcome="fell", success=False), Failure.TOO_LOW),
+        (several(GOOD, GOOD | FELL, outcome="fell", success=False), Failure.FELL_FORWARD),
+        (several(GOOD, outcome="diverged", success=False), Failure.DIVERGED),
+        # It landed, and never jumped again.
+        (several(GOOD, outcome="no take-off", success=False), Failure.NO_TAKEOFF),
+    ],
+)
+def test_the_first_jump_that_failed_counts(info, failure):
+    assert failure_in(info, SuccessConfig()) is failure

@@ -30,10 +30,28 @@ class Failure(StrEnum):
     TOO_LOW = "too low"
 
 
+def failure_in(info: Mapping[str, Any], success: SuccessConfig) -> Failure | None:
+    """The failure class of a finished episode: that of its first jump that failed.
+
+    Args:
+        info: The info of its last step.
+        success: What counts as a success.
+    """
+    if "series" not in info:
+        return failure_of(info["outcome"], info["jump"], info["jump_height"], success)
+    jumps, heights = info["jumps"], info["series"]["jump_heights"]
+    outcomes = [*["stood"] * (len(jumps) - 1), info["outcome"]]
+    for outcome, jump, height in zip(outcomes, jumps, heights, strict=True):
+        failure = failure_of(outcome, jump, height, success)
+        if failure is not None:
+            return failure
+    return None if info["is_success"] else Failure.NO_TAKEOFF
+
+
 def failure_of(
     outcome: str, jump: Mapping[str, Any], jump_height: float, success: SuccessConfig
 ) -> Failure | None:
-    """The failure class of a finished episode, or None for a success.
+    """The failure class of a jump, or None for a success.
 
     A jump that did not land is classed by what came before the fall, else by its
     direction; one that landed can only have been too low.

@@ -162,6 +162,7 @@ def _episode(entry: dict[str, Any]) -> Episode:
         jump={name: _like(metrics[name], _value(value)) for name, value in jump.items()},
         failure=None if failure is None else Failure(failure),
         world={name: _value(value) for name, value in entry["world"].items()},
+        series={name: _value(value) for name, value in entry["series"].items()},
     )
 
 

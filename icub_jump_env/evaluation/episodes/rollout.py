@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
-from icub_jump_env.evaluation.episodes.failures import Failure, failure_of
+from icub_jump_env.evaluation.episodes.failures import Failure, failure_in
 from icub_jump_env.planning.plan import JumpPlan
 from icub_jump_env.policy import BASELINE, Policy
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
@@ -32,9 +32,10 @@ class Episode:
         outcome: ``stood``, ``fell``, ``no take-off`` or ``diverged``.
         is_success: Whether it counts as a success.
         reward: Sum of its rewards.
-        jump: Metrics by name, SI units.
+        jump: Metrics of the last jump by name, SI units.
         failure: Class of the failure, if it was one.
         world: What was drawn at the reset.
+        series: ``info["series"]``; empty of a single jump.
         trace: Snapshots at the control rate, if asked for.
     """
 
@@ -46,6 +47,7 @@ class Episode:
     jump: dict[str, Any]
     failure: Failure | None = None
     world: dict[str, Any] = field(default_factory=dict)
+    series: dict[str, Any] = field(default_factory=dict)
     trace: tuple[Snapshot, ...] = ()
 
 
@@ -102,15 +104,15 @@ def run_episode(
             action = policy(observation)
         observation, reward, terminated, _, info = env.step(action)
         total += reward
-    height, outcome, jump = info["jump_height"], info["outcome"], info["jump"]
     return Episode(
         seed=seed,
-        jump_height=height,
-        outcome=outcome,
+        jump_height=info["jump_height"],
+        outcome=info["outcome"],
         is_success=info["is_success"],
         reward=total,
-        jump=jump,
-        failure=failure_of(outcome, jump, height, env.config.success),
+        jump=info["jump"],
+        failure=failure_in(info, env.config.success),
         world=world,
+        series=info.get("series", {}),
         trace=tuple(snapshots),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from icub_jump_env.evaluation.report.provenance import plans, provenance, source
 from icub_jump_env.files import strict_json
 from icub_jump_env.simulation.randomization import Randomization
 from icub_jump_env.simulation.sensor_models import SensorConfig
+
+RESUME = "add --resume to the command to finish"
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Series:
         resume: bool,
         jobs: int,
         progress: Console,
-        remedy: str = "add --resume to the command to finish",
+        remedy: str = RESUME,
     ) -> list[Episode]:
         """Run the episodes that the log lacks.
 
@@ -61,35 +64,23 @@ class Series:
         Raises:
             ConfigError: If the existing log answers another question.
         """
-        total = len(self.seeds)
+        log = self.open_log(path, resume)
+        (episodes,) = fill([(self, log)], jobs, progress, remedy)
+        say(progress, f"wrote {path}")
+        return episodes
+
+    def open_log(self, path: Path, resume: bool) -> EpisodeLog:
+        """The log at ``path``, as :class:`EpisodeLog` opens it.
+
+        Raises:
+            ConfigError: If the existing log answers another question.
+        """
         header = {
-            "episodes": total,
+            "episodes": len(self.seeds),
             "policy": self.contender.identity,
             **provenance(self.config, self.seeds.start),
         }
-        log = EpisodeLog(path, header, resume)
-        if log.kept is not None:
-            say(progress, f"kept the earlier episodes in {log.kept}")
-        if log.damaged:
-            lines = "1 damaged line" if log.damaged == 1 else f"{log.damaged} damaged lines"
-            say(progress, f"dropped {lines} of {log.path}: what is missing is jumped again")
-        missing = [seed for seed in self.seeds if seed not in log.episodes]
-        work = [Job(self.config, seed, self.contender.policy) for seed in missing]
-        with progress_display(progress) as display:
-            name = f"jumping, {escape(self.contender.name)}"
-            task = display.add_task(name, total=total, completed=total - len(missing))
-            try:
-                with contextlib.closing(run_jobs(work, jobs)) as results:
-                    for _, episode in results:
-                        log.append(episode)
-                        display.advance(task)
-            except BaseException:
-                kept = f"{len(log.episodes)} of {total} episodes are in {log.path}"
-                say(progress, f"{kept}; {remedy}")
-                raise
-        log.finish()
-        say(progress, f"wrote {log.path}")
-        return [log.episodes[seed] for seed in self.seeds]
+        return EpisodeLog(path, header, resume)
 
     def complete(self, jobs: int, progress: Console) -> list[Episode]:
         """All episodes; those that the default log has are not run again."""
@@ -119,6 +110,56 @@ class Series:
             digest,
         )
         return Path("results") / f"{'-'.join(words)}.jsonl"
+
+
+def fill(
+    logs: Sequence[tuple[Series, EpisodeLog]], jobs: int, progress: Console, remedy: str = RESUME
+) -> list[list[Episode]]:
+    """Run the episodes that the logs of some series lack, all side by side.
+
+    Args:
+        logs: Each series with its log.
+        jobs: Number of worker processes.
+        progress: Where the progress is shown.
+        remedy: What to say of an interrupted run.
+
+    Returns:
+        All episodes of each series, by seed.
+    """
+    first = logs[0][1].path
+    place = str(first) if len(logs) == 1 else f"{len(logs)} logs in {first.parent}"
+    kept = [log.kept for _, log in logs if log.kept is not None]
+    if kept:
+        where = kept[0] if len(kept) == 1 else f"{len(kept)} logs beside the new ones"
+        say(progress, f"kept the earlier episodes in {where}")
+    damaged = sum(log.damaged for _, log in logs)
+    if damaged:
+        lines = "1 damaged line" if damaged == 1 else f"{damaged} damaged lines"
+        say(progress, f"dropped {lines} of {place}: what is missing is jumped again")
+    missing = [
+        (log, Job(series.config, seed, series.contender.policy))
+        for series, log in logs
+        for seed in series.seeds
+        if seed not in log.episodes
+    ]
+    total = sum(len(series.seeds) for series, _ in logs)
+    names = ", ".join(dict.fromkeys(series.contender.name for series, _ in logs))
+    with progress_display(progress) as display:
+        task = display.add_task(
+            f"jumping, {escape(names)}", total=total, completed=total - len(missing)
+        )
+        try:
+            with contextlib.closing(run_jobs([job for _, job in missing], jobs)) as results:
+                for index, episode in results:
+                    missing[index][0].append(episode)
+                    display.advance(task)
+        except BaseException:
+            done = sum(len(log.episodes) for _, log in logs)
+            say(progress, f"{done} of {total} episodes are in {place}; {remedy}")
+            raise
+    for _, log in logs:
+        log.finish()
+    return [[log.episodes[seed] for seed in series.seeds] for series, log in logs]
 
 
 def world(config: JumpConfig) -> str:

@@ -39,11 +39,16 @@ _ON_A_PAGE: dict[Any, Any] = {
 }
 
 
+def figure_of(size: tuple[float, float]) -> Figure:
+    """An empty figure (inches)."""
+    return Figure(figsize=size, dpi=DPI, layout="constrained")
+
+
 def panels(
     size: tuple[float, float], rows: int = 1, columns: int = 1, **layout: Any
 ) -> tuple[Figure, Any]:
     """A figure and its axes, (rows, columns)."""
-    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    figure = figure_of(size)
     with matplotlib.rc_context({"axes.spines.top": False, "axes.spines.right": False}):
         return figure, figure.subplots(rows, columns, squeeze=False, **layout)
 

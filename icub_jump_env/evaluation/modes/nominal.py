@@ -41,7 +41,7 @@ from icub_jump_env.evaluation.statistics.paper import (
     comparison_rows,
     verdict,
 )
-from icub_jump_env.evaluation.statistics.summary import Summary
+from icub_jump_env.evaluation.statistics.summary import Summary, landed_in_a_row
 
 if TYPE_CHECKING:
     from icub_jump_env.evaluation.figures.style import Figure
@@ -139,6 +139,8 @@ def run(
     show(console, render_table(rows, f"{title}; the paper's: 4 cm after 11 cm", column))
     if contender.is_baseline:
         say(console, verdict(config, ours.episode, other.episode))
+    if config.jumps > 1:
+        say(console, landed_in_a_row(ours.repeated, config.jumps))
 
 
 def _figures(arms: Sequence[Arm], options: EvalOptions) -> dict[str, Callable[[], Figure]]:

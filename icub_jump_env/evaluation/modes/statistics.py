@@ -17,7 +17,7 @@ from icub_jump_env.evaluation.episodes.series import Series, warn_if_alike, worl
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.evaluation.quantities import QUANTITIES, commands, number, seeds
 from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
-from icub_jump_env.evaluation.statistics.summary import Summary
+from icub_jump_env.evaluation.statistics.summary import Summary, landed_in_a_row
 from icub_jump_env.files import strict_json
 
 if TYPE_CHECKING:
@@ -71,11 +71,14 @@ def render(
     if several:
         lines.append(f"mean rise: {number(summary.mean_rise, 'cm')} cm")
     lines.append(f"success: {summary.success}")
+    if config.jumps > 1:
+        lines.append(landed_in_a_row(episodes, config.jumps))
     for kind, failed in summary.failures.items():
         shown = ", ".join(map(str, failed[:10])) + (", ..." if len(failed) > 10 else "")
         lines.append(f"{kind}: {len(failed)} (seeds {shown})" if several else f"failure: {kind}")
     failures = [e for kind in summary.failures for e in episodes if e.failure is kind]
-    if failures:
+    # What a longer series drew for each jump no flag can say.
+    if failures and (config.jumps == 1 or isinstance(config.jump_height, float)):
         # In the range of commands it drew this one.
         jump = dataclasses.replace(config, jump_height=failures[0].jump_height)
         words = replay_arguments(jump, failures[0].seed)

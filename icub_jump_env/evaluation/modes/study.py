@@ -59,7 +59,7 @@ def _rise_spread(summary: Summary) -> str:
     return spread(low, high, "cm")
 
 
-def _share(rate: Rate) -> str:
+def share(rate: Rate) -> str:
     """A share, with its interval unless it is the whole."""
     whole = number(rate.share, "%")
     if rate.count == rate.total:
@@ -70,7 +70,7 @@ def _share(rate: Rate) -> str:
 
 _RISE = {"rise": _median("flight_height", "cm"), "10 to 90 %": _rise_spread}
 _ROTATION = {"rot.": _median("flight_rotation", "deg")}
-_LANDED = {"landed": lambda summary: _share(summary.landed)}
+_LANDED = {"landed": lambda summary: share(summary.landed)}
 
 STUDIES = {
     "realism": Study("Realism study", cases.realism, _RISE | _ROTATION | _LANDED),
@@ -78,7 +78,7 @@ STUDIES = {
         "Task and momentum as costs (soft) or constraints (hard)",
         cases.constraints,
         _RISE
-        | {"success": lambda summary: _share(summary.success)}
+        | {"success": lambda summary: share(summary.success)}
         | {"unsolved": _median("solver_failures", "steps")},
     ),
     "launch_end": Study("What ends the launch", cases.launch_end, _RISE | _ROTATION | _LANDED),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,66 @@ from icub_jump_env.evaluation.statistics.intervals import (
     bootstrap_interval,
     paired_interval,
 )
+
+
+@dataclass(frozen=True)
+class RateDifference:
+    """One rate against another one of the same episodes.
+
+    Attributes:
+        pairs: Number of episodes.
+        won: Episodes that only ours counts.
+        lost: Episodes that only theirs counts.
+        p_value: Of McNemar's exact test: how likely won and lost are to differ as much by
+            chance.
+        gain: Our rate minus theirs (1 is all episodes).
+        interval: Its interval of 95 %, see :func:`paired_interval`.
+        corrected_p_value: As in :class:`Difference`.
+    """
+
+    pairs: int
+    won: int
+    lost: int
+    p_value: float
+    gain: float
+    interval: Interval
+    corrected_p_value: float | None = None
+
+    @classmethod
+    def of(
+        cls,
+        ours: Sequence[Episode],
+        theirs: Sequence[Episode],
+        counts: Callable[[Episode], bool],
+    ) -> RateDifference:
+        """The difference of two lists with the same seeds in the same order.
+
+        Args:
+            ours: Episodes of the one.
+            theirs: Episodes of the other one.
+            counts: Whether an episode counts.
+
+        Raises:
+            ValueError: If the seeds differ.
+        """
+        if [episode.seed for episode in ours] != [episode.seed for episode in theirs]:
+            raise ValueError("pairs of episodes have the same seeds in the same order")
+        gains = [int(counts(o)) - int(counts(t)) for o, t in zip(ours, theirs, strict=True)]
+        won, lost = gains.count(1), gains.count(-1)
+        return cls(
+            pairs=len(gains),
+            won=won,
+            lost=lost,
+            p_value=float(binomtest(won, won + lost).pvalue) if won + lost else 1.0,
+            gain=(won - lost) / len(gains),
+            interval=paired_interval(won, lost, len(gains)),
+        )
+
+    @property
+    def sign(self) -> int:
+        """1 if the interval lies above zero, -1 if below, 0 if it holds zero."""
+        low, high = self.interval
+        return int(low > 0.0) - int(high < 0.0)
 
 
 @dataclass(frozen=True)
@@ -58,21 +119,18 @@ class Difference:
         Raises:
             ValueError: If the seeds differ.
         """
-        if [episode.seed for episode in ours] != [episode.seed for episode in theirs]:
-            raise ValueError("pairs of episodes have the same seeds in the same order")
-        gains = np.array([o.is_success - t.is_success for o, t in zip(ours, theirs, strict=True)])
-        won, lost = int((gains > 0).sum()), int((gains < 0).sum())
+        rate = RateDifference.of(ours, theirs, lambda episode: episode.is_success)
         rises, soles = (
             _values(ours, metric) - _values(theirs, metric)
             for metric in ("flight_height", "sole_height")
         )
         return cls(
-            pairs=len(gains),
-            won=won,
-            lost=lost,
-            p_value=float(binomtest(won, won + lost).pvalue) if won + lost else 1.0,
-            success=float(gains.mean()),
-            success_interval=paired_interval(won, lost, len(gains)),
+            pairs=rate.pairs,
+            won=rate.won,
+            lost=rate.lost,
+            p_value=rate.p_value,
+            success=rate.gain,
+            success_interval=rate.interval,
             rise=float(rises.mean()),
             rise_interval=bootstrap_interval(rises),
             sole_height=float(soles.mean()),
@@ -98,7 +156,10 @@ class Difference:
         )
 
 
-def holm_corrected(differences: Sequence[Difference]) -> list[Difference]:
+AnyDifference = TypeVar("AnyDifference", Difference, RateDifference)
+
+
+def holm_corrected(differences: Sequence[AnyDifference]) -> list[AnyDifference]:
     """The same differences, their p-values corrected for being several by Holm's method.
 
     The smallest of n is multiplied by n, the next one by n - 1, and so on; none gets smaller

@@ -117,6 +117,14 @@ class Summary:
         return vars(self) | {"success": self.success.as_dict(), "landed": self.landed.as_dict()}
 
 
+def landed_in_a_row(episodes: Sequence[Episode], jumps: int) -> str:
+    """How many jumps of a series of ``jumps`` landed, from the first on; one line."""
+    landed = [episode.series["landed"] for episode in episodes]
+    complete = Rate(landed.count(jumps), len(landed))
+    mean = sum(landed) / len(landed)
+    return f"jumps landed in a row: {mean:.3g} of {jumps}; complete series: {complete}"
+
+
 def _percentiles(values: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, float, float]:
     defined = values[~np.isnan(values)]
     if not defined.size:
