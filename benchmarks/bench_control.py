@@ -10,22 +10,24 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import time
 from collections import defaultdict
 from collections.abc import Callable
 from functools import partial
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
 
-from icub_jump_env.config import JumpConfig
+from icub_jump_env.config import VERSIONS, JumpConfig
 from icub_jump_env.control.config import CONTROLLERS, ControllerName, SolverName, TorqueConfig
+from icub_jump_env.control.phases import Tick
 from icub_jump_env.control.qp.check import check_solution
 from icub_jump_env.control.qp.solvers import make_solver
 from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.readings import Readings
+from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
 from icub_jump_env.planning.reference import Reference
 from icub_jump_env.planning.residual import ResidualFilter
@@ -55,10 +57,14 @@ class Stopwatch:
 
     def time(self, part: str, call: Callable[[], object]) -> Any:
         """Run ``call`` and note its duration; return what it returns."""
-        start = time.perf_counter_ns()
+        start = perf_counter_ns()
         result = call()
-        self._durations[part].append((time.perf_counter_ns() - start) / 1e3)
+        self.note(part, start)
         return result
+
+    def note(self, part: str, start: int) -> None:
+        """Note the duration of a part that began at ``start`` (ns of the clock)."""
+        self._durations[part].append((perf_counter_ns() - start) / 1e3)
 
     def medians(self) -> dict[str, float]:
         """Median duration of each part."""
@@ -125,14 +131,46 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
     print(f"  before it: {', '.join(before)}")
 
 
+def bench_phases(name: ControllerName, episodes: int) -> None:
+    """Print the ticks of all phases with feedback in flight and landing, estimate included."""
+    env = make_env(JumpConfig.of(controller=name, stand_time=1.0, **VERSIONS["ICubJump-v1"]))
+    watch = Stopwatch()
+    controller, estimator = env._controller, env._estimator
+    tick, estimate = controller.tick, estimator.estimate
+
+    def timed_estimate(readings: Readings) -> RobotState:
+        phase = controller.phases.phase.name.lower()
+        return watch.time(f"estimate {phase}", partial(estimate, readings))
+
+    def timed_tick(state: RobotState, time: float, target: np.ndarray) -> Tick:
+        start = perf_counter_ns()
+        result = tick(state, time, target)
+        # Known only now: a tick may begin a phase.
+        watch.note(controller.phases.phase.name.lower(), start)
+        return result
+
+    controller.tick, estimator.estimate = timed_tick, timed_estimate
+    for seed in range(episodes):
+        run_episode(env, seed)
+    env.close()
+    medians = watch.medians()
+    print(f"{name} controller, ICubJump-v1: control tick, and estimate before it")
+    for phase in ("launch", "flight", "landing"):
+        p99, worst = watch.tail(phase)
+        print(
+            f"  {phase:8s} {medians[phase]:6.1f} us (99 % within {p99:.0f}, worst {worst:.0f}), "
+            f"estimate {medians['estimate ' + phase]:.1f} us"
+        )
+
+
 def bench_episode(name: ControllerName, repetitions: int) -> None:
     """Print how much faster than real time the nominal episode runs."""
     env = make_env(JumpConfig(controller=name))
     factors = []
     for seed in range(repetitions):
-        start = time.perf_counter()
+        start = perf_counter_ns()
         episode = run_episode(env, seed)
-        wall = time.perf_counter() - start
+        wall = (perf_counter_ns() - start) / 1e9
         flown = episode.jump["takeoff_time"] + episode.jump["flight_time"]
         factors.append((flown + env.config.success.stand_time) / wall)
     env.close()
@@ -151,6 +189,8 @@ def main() -> None:
     for solver in ("daqp", "osqp"):
         for controller in ("velocity", "torque"):
             bench_tick(controller, solver, arguments.ticks)
+    for controller in ("velocity", "torque"):
+        bench_phases(controller, max(1, arguments.episodes // 3))
     for controller in ("velocity", "torque"):
         bench_episode(controller, arguments.episodes)
 
