@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.robot.frames import heading
 from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot
@@ -87,7 +88,7 @@ class Catch:
         """
         mass, dt = self._kinematics.mass, self._dt
         # A dozen numbers: floats take a third of the time of arrays.
-        cos, sin = _heading(state.base_rotation)
+        cos, sin = heading(state.base_rotation)
         x, y, z = (state.com - state.sole_position.sum(axis=0) / 2).tolist()
         goal_x, goal_y, _ = com.tolist()
         vx, vy, _ = state.com_velocity.tolist()
@@ -100,8 +101,7 @@ class Catch:
         x, y = x - z * gx / gz, y - z * gy / gz
         ahead, left = cos * x + sin * y, cos * y - sin * x
         goal_ahead, goal_left = cos * goal_x + sin * goal_y, cos * goal_y - sin * goal_x
-        lunge_momentum = self._momentum_per_lunge * self._rate
-        falling = cos * Hy - sin * Hx - lunge_momentum
+        falling = cos * Hy - sin * Hx - self._momentum_per_lunge * self._rate
         speed = cos * vx + sin * vy + MOMENTUM_SHARE * lever * falling
         point = ahead - goal_ahead + speed / frequency
 
@@ -162,13 +162,6 @@ def lunge_momentum(robot: Robot) -> float:
     constraints = np.vstack((kinematics.J_feet, kinematics.centroidal_map))
     per_momentum = ease * np.linalg.pinv(constraints * ease, rcond=1e-6)[:, -2]
     return 1.0 / float(np.abs(per_momentum[: robot.arms.start]).max())
-
-
-def _heading(rotation: Array) -> tuple[float, float]:
-    """Cosine and sine of the heading of a base, which faces its own -x."""
-    x, y = -float(rotation[0, 0]), -float(rotation[1, 0])
-    length = math.hypot(x, y)
-    return x / length, y / length
 
 
 def _within(value: float, bound: float) -> float:

@@ -15,6 +15,7 @@ from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.planning.minimum_jerk import MinimumJerk, progress
 from icub_jump_env.planning.plan import JumpPlan, Setpoint
 from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.robot.frames import heading
 from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.soles import LegKinematics
@@ -174,9 +175,8 @@ class FeedbackFlight:
         # As one rigid body: what the legs do to the base comes back as an echo.
         spin = self._inverse_inertia @ (state.angular_momentum @ state.base_rotation)
         rotation = state.base_rotation @ pin.exp3(LEAD * spin)
-        # The base faces its own -x. The soles turn with the robot, about the vertical alone.
-        x, y = -float(rotation[0, 0]), -float(rotation[1, 0])
-        cos, sin = x / math.hypot(x, y), y / math.hypot(x, y)
+        # The soles turn with the robot, about the vertical alone.
+        cos, sin = heading(rotation)
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         self._place(state)
         soles = self._spread @ turn.T - self.setpoint.com_position
