@@ -16,7 +16,7 @@ from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
-CAPTURE_GAIN, LATERAL_CAPTURE_GAIN = 6.0, 4.0
+CAPTURE_GAIN, LATERAL_CAPTURE_GAIN = 10.0, 4.0
 """How fast the CoP brings the capture point back, forward and sideways (1/s)."""
 FARTHEST_COP, FARTHEST_LATERAL_COP = 0.075, 0.06
 """Bounds of the CoP from the middle of the soles, forward and sideways (m)."""
@@ -153,8 +153,8 @@ class Catch:
 def lunge_momentum(robot: Robot) -> float:
     """Pitch momentum (kg m^2) per rate of a lunge, which counts its fastest joint (rad).
 
-    It is the smallest motion of the joints from the landing posture that leaves feet and CoM where they
-    are and has no other momentum.
+    It is the smallest motion of the joints from the landing posture that leaves feet and CoM
+    where they are and has no other momentum.
     """
     kinematics = FeetFixedKinematics(robot)
     kinematics.update(robot.landing)

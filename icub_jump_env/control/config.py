@@ -35,8 +35,8 @@ class PhaseConfig:
     Attributes:
         launch_end: ``time``: at T or at lift-off, whichever is first. ``lift_off``: at
             lift-off alone; from T on the CoM reference falls freely.
-        lift_off: Total normal force (N) below which the feet may have lifted; 3 % of
-            the weight.
+        lift_off: Total normal force (N) below which the feet may have lifted in the launch;
+            3 % of the weight. After it ``touch_down`` tells.
         touch_down: Total normal force (N) above which an airborne robot has landed.
         lift_off_ticks: Consecutive control ticks below ``lift_off`` that make a
             lift-off; a single one is chatter.

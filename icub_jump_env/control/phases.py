@@ -90,7 +90,9 @@ class PhaseMachine:
         """
         config = self._config
         if not self.airborne:
-            unloaded = normal_force < config.lift_off
+            # After T no launch is cut short any more, and sensors may have an offset.
+            launching = self.phase is Phase.LAUNCH
+            unloaded = normal_force < (config.lift_off if launching else config.touch_down)
             self._unloaded_ticks = self._unloaded_ticks + 1 if unloaded else 0
             self.airborne = self._unloaded_ticks >= config.lift_off_ticks
         over = self.airborne or (config.launch_end == "time" and time >= duration)

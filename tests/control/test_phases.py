@@ -72,6 +72,14 @@ def test_flight_cannot_end_before_a_lift_off():
     assert set(phases) == {Phase.FLIGHT}
 
 
+def test_a_force_sensor_with_an_offset_does_not_hide_the_flight():
+    machine = PhaseMachine(PhaseConfig())
+    phases = [machine.update(T + i * DT, T, f) for i, f in enumerate([WEIGHT, 13, 13, 13, 500])]
+    assert phases[3:] == [Phase.FLIGHT, Phase.LANDING]
+    # In the launch it does not end the contact early.
+    assert set(run([WEIGHT, 13, 13, 13])) == {Phase.LAUNCH}
+
+
 def test_flight_ends_at_the_first_contact_after_lift_off():
     phases = run([WEIGHT] * 5 + [0.0] * 10 + [500.0])
     assert phases[-2:] == [Phase.FLIGHT, Phase.LANDING]
