@@ -2,7 +2,7 @@
 
 from agents.options import SELECTION
 
-__all__ = ["PLANNER_TEST", "SELECTION", "TEST", "TUNING"]
+__all__ = ["LANDING_TEST", "PLANNER_TEST", "SELECTION", "TEST", "TUNING"]
 
 TUNING = range(200)
 """Tuned the controllers; choose constants, mean actions and the strongest baselines."""
@@ -17,3 +17,6 @@ of the shipped policies, which were chosen earlier, are of those seeds.
 
 PLANNER_TEST = range(5000, 5200)
 """Held out from everything that chose whole-body plans."""
+
+LANDING_TEST = range(6000, 6200)
+"""Held out from everything that chose estimator, flight and landing."""

@@ -163,15 +163,13 @@ def _undisturbed(controller: ControllerName) -> list[LandingCase]:
     curve_8: dict[str, Any] = {"jump_height": 0.08, "com_displacement": 0.08}
     curve_6: dict[str, Any] = {"jump_height": 0.06, "com_displacement": 0.08}
     plan: dict[str, Any] = {"planner": "whole_body"}
-    highest = HIGHEST[controller]
     jumps: dict[str, dict[str, Any]] = {
         "4 cm, full": {"jump_height": 0.04, "randomization": "full"},
         "4 cm, hard": {"jump_height": 0.04, "randomization": "hard"},
         "8 cm after 8 cm, full": curve_8 | {"randomization": "full"},
         "6 cm after 8 cm, hard": curve_6 | {"randomization": "hard"},
         "5 cm, disturbed": {"jump_height": 0.05, "randomization": "disturbed"},
-        f"{CM * highest:g} cm plan, full": plan
-        | {"jump_height": highest, "randomization": "full"},
+        "highest plan, full": plan | {"jump_height": HIGHEST[controller], "randomization": "full"},
         "6 cm plan, hard": plan | {"jump_height": 0.06, "randomization": "hard"},
         "8 cm after 8 cm, full, sensors": curve_8
         | {"randomization": "full", "sensors": "realistic"},

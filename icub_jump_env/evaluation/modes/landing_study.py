@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.rollout import Episode
@@ -20,6 +21,7 @@ from icub_jump_env.evaluation.episodes.series import Series, fill
 from icub_jump_env.evaluation.modes.landing_cases import (
     FEEDBACK,
     FLIGHT_TIME,
+    HIGHEST,
     HOLD,
     VARIANTS,
     LandingCase,
@@ -28,7 +30,7 @@ from icub_jump_env.evaluation.modes.landing_cases import (
 )
 from icub_jump_env.evaluation.modes.study import share
 from icub_jump_env.evaluation.options import STUDY_EPISODES, EvalOptions
-from icub_jump_env.evaluation.quantities import CONTROLLERS, number, seeds
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, number, seeds
 from icub_jump_env.evaluation.report.output import new_table, say, show, write_results
 from icub_jump_env.evaluation.statistics.difference import RateDifference, holm_corrected
 from icub_jump_env.evaluation.statistics.summary import Summary
@@ -61,7 +63,7 @@ class LandingResult:
             case,
             {variant: Summary.of(found) for variant, found in episodes.items()},
             {
-                variant: RateDifference.of(found, episodes[HOLD], _stands)
+                variant: RateDifference.of(found, episodes[HOLD], stands)
                 for variant, found in episodes.items()
                 if variant != HOLD
             },
@@ -89,8 +91,10 @@ Results = dict[ControllerName, list[LandingResult]]
 """Results of all cases by controller."""
 
 
-def _stands(episode: Episode) -> bool:
-    return bool(episode.jump["landed"])
+def stands(episode: Episode) -> bool:
+    """Whether the robot stands in the end, after each jump of a series."""
+    in_a_row = episode.series.get("landed", 0)
+    return bool(episode.jump["landed"]) and in_a_row == episode.series.get("jumps", 0)
 
 
 def run(options: EvalOptions, _: Sequence[Contender], console: Console, progress: Console) -> None:
@@ -127,24 +131,49 @@ def run_cases(options: EvalOptions, progress: Console) -> Results:
     """Run every case with both controllers and each variant."""
     jumps = {name: options.config.for_controller(name) for name in CONTROLLERS}
     cases = {name: landing_cases(config) for name, config in jumps.items()}
+    return compare(
+        jumps, cases, list(VARIANTS), used_seeds(options), options.jobs, options.resume, progress
+    )
+
+
+def compare(
+    jumps: Mapping[ControllerName, JumpConfig],
+    cases: Mapping[ControllerName, Sequence[LandingCase]],
+    variants: Sequence[str],
+    used: range,
+    jobs: int,
+    resume: bool,
+    progress: Console,
+) -> Results:
+    """Run cases with some variants, each on the same seeds.
+
+    Args:
+        jumps: The configuration of each controller, which the cases change.
+        cases: The cases of each controller.
+        variants: Names among :data:`VARIANTS`, the paper's among them.
+        used: The seeds.
+        jobs: Number of worker processes.
+        resume: Whether to go on with existing logs.
+        progress: Where the progress is shown.
+    """
     series = [
-        Series(config.replace(**case.changes, **VARIANTS[variant]), used_seeds(options))
+        Series(config.replace(**case.changes, **VARIANTS[variant]), used)
         for name, config in jumps.items()
         for case in cases[name]
-        for variant in VARIANTS
+        for variant in variants
     ]
     logs = [
-        each.open_log(path, options.resume and path.exists())
+        each.open_log(path, resume and path.exists())
         for each in series
         for path in (each.default_log(),)
     ]
-    done = iter(fill(list(zip(series, logs, strict=True)), options.jobs, progress))
+    done = iter(fill(list(zip(series, logs, strict=True)), jobs, progress))
     results = {
         name: [
-            LandingResult.of(case, {variant: next(done) for variant in VARIANTS})
+            LandingResult.of(case, {variant: next(done) for variant in variants})
             for case in cases[name]
         ]
-        for name in CONTROLLERS
+        for name in jumps
     }
     return _corrected(results)
 
@@ -195,6 +224,7 @@ def render(controller: ControllerName, results: Results, options: EvalOptions) -
         f"zero, as about one in 20 of the {compared} comparisons of both controllers does by "
         "chance; --json has p-values corrected for their number\n"
         "disturbances: of jumps of 4 cm, full, whose first row is size zero; rotation: spin times "
-        f"{FLIGHT_TIME:g} s; pushes in m/s: impulse divided by the nominal mass of the robot"
+        f"{FLIGHT_TIME:g} s; pushes in m/s: impulse divided by the nominal mass of the robot; "
+        f"highest plan: {CM * HIGHEST[controller]:g} cm"
     )
     return table
