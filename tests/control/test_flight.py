@@ -13,11 +13,9 @@ from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.planning.residual import ResidualFilter
 from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
-from icub_jump_env.robot.soles import LegKinematics
 
 DT = 0.005
 PLAN = ScaledCurvePlan(plan_com_trajectory(0.04), ROBOT, STANCE)
-LEGS = LegKinematics(ROBOT)
 KINEMATICS = FeetFixedKinematics(ROBOT)
 KINEMATICS.update(ROBOT.landing)
 UPRIGHT = KINEMATICS.base_rotation.copy()
@@ -55,8 +53,12 @@ def fly(state, ticks=120, target=NOTHING, flight=None):
 
 def soles(command, rotation=UPRIGHT):
     """Middles of the soles from the CoM, and their orientations, in the world."""
-    positions, orientations = LEGS.place(command.position)
-    return positions @ rotation.T, rotation @ orientations
+    there = FeetFixedKinematics(ROBOT)
+    there.update(command.position)
+    ankles, points = there.base_M_ankles, there.ankle_p_soles
+    positions = [ankle.act(p) - there.base_p_com for ankle, p in zip(ankles, points, strict=True)]
+    # The sole frames have the axes of the ankles.
+    return positions @ rotation.T, [rotation @ ankle.rotation for ankle in ankles]
 
 
 def test_without_anything_to_correct_it_is_the_minimum_jerk():
