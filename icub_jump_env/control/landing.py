@@ -123,16 +123,18 @@ class FeedbackLanding:
         self._catch = Catch(kinematics, dt)
         self._soles_apart = SolesApart(kinematics)
         self._velocity = np.zeros(n)
+        centroidal = CentroidalVelocity(kinematics, COM_WEIGHT, MOMENTUM_WEIGHT)
         self._qp = TaskQP(
-            n,
+            n + centroidal.size,
             costs=[
                 PostureVelocity(POSTURE_GAIN, robot.per_joint("posture", POSTURE_WEIGHT)),
                 VelocitySmoothness(
                     robot.per_joint("smoothness", SMOOTHNESS_WEIGHT), self._velocity
                 ),
+                centroidal,
             ],
-            soft=[CentroidalVelocity(kinematics, COM_WEIGHT, MOMENTUM_WEIGHT)],
-            hard=[self._soles_apart],
+            soft=[],
+            hard=[centroidal, self._soles_apart],
             limits=[VelocityLimits(robot, LIMIT_HORIZON, SPEED_SHARE)],
             solver=solver,
         )
@@ -186,7 +188,7 @@ class FeedbackLanding:
         if report.failed:
             self._velocity *= 0.8
         else:
-            self._velocity[:] = solution.x
+            self._velocity[:] = solution.x[: len(self._velocity)]
         position, step = self._position, s - self._position
         np.minimum(np.maximum(step, -LARGEST_LAG, out=step), LARGEST_LAG, out=step)
         step *= REFERENCE_LEAK
