@@ -89,11 +89,15 @@ class Catch:
         mass, dt = self._kinematics.mass, self._dt
         # A dozen numbers: floats take a third of the time of arrays.
         cos, sin = heading(state.base_rotation)
-        x, y, z = (state.com - state.sole_position.sum(axis=0) / 2).tolist()
+        x, y, z = state.com.tolist()
+        left_sole, right_sole = state.sole_position.tolist()
         goal_x, goal_y, _ = com.tolist()
         vx, vy, _ = state.com_velocity.tolist()
         Hx, Hy, _ = state.angular_momentum.tolist()
         gx, gy, gz = state.gravity.tolist()
+        x -= (left_sole[0] + right_sole[0]) / 2
+        y -= (left_sole[1] + right_sole[1]) / 2
+        z -= (left_sole[2] + right_sole[2]) / 2
         height = max(LOWEST_COM, z)
         frequency = math.sqrt(GRAVITY / height)
         lever = 1.0 / (mass * height)
@@ -108,7 +112,7 @@ class Catch:
         # A lunge's acceleration shifts the CoP that the CoM feels by this much.
         shift = self._momentum_per_lunge * lever / frequency**2
         needed = point * (1.0 + LUNGE_GAIN / frequency)
-        lunge = float(self._kinematics.J_momentum[1] @ away) / self._momentum_per_lunge
+        lunge = float(self._kinematics.J_momentum[1].dot(away)) / self._momentum_per_lunge
         lean = self._lean(state, cos, sin)
         rate = self._lunge_rate(lunge, needed / shift, FARTHEST_COP / shift, lean)
         wanted = point * (1.0 + CAPTURE_GAIN / frequency) - shift * (rate - self._rate) / dt
@@ -125,7 +129,7 @@ class Catch:
 
     def _lean(self, state: RobotState, cos: float, sin: float) -> float:
         """Lean of the chest, forward (rad)."""
-        x, y, z = (state.base_rotation @ self._kinematics.chest_up()).tolist()
+        x, y, z = state.base_rotation.dot(self._kinematics.chest_up()).tolist()
         return math.atan2(cos * x + sin * y, z)
 
     def _lunge_rate(self, lunge: float, needed: float, borne: float, lean: float) -> float:
@@ -140,14 +144,9 @@ class Catch:
         back = -RETURN_STIFFNESS * lunge - RETURN_DAMPING * self._rate
         wanted = min(max(_within(back, HARDEST_RETURN), needed - borne), needed + borne)
         rate = self._rate + self._dt * _within(wanted, HARDEST_LUNGE)
-        left = (
-            min(lunge + FARTHEST_LUNGE, (lean + FARTHEST_LEAN) / LEAN_PER_LUNGE),
-            min(FARTHEST_LUNGE - lunge, (FARTHEST_LEAN - lean) / LEAN_PER_LUNGE),
-        )
-        slowest, fastest = (
-            min(FASTEST_LUNGE, math.sqrt(2.0 * STOPPING_LUNGE * max(0.0, way))) for way in left
-        )
-        return min(max(rate, -slowest), fastest)
+        backward = min(FARTHEST_LUNGE + lunge, (FARTHEST_LEAN + lean) / LEAN_PER_LUNGE)
+        forward = min(FARTHEST_LUNGE - lunge, (FARTHEST_LEAN - lean) / LEAN_PER_LUNGE)
+        return min(max(rate, -_stoppable(backward)), _stoppable(forward))
 
 
 def lunge_momentum(robot: Robot) -> float:
@@ -162,6 +161,11 @@ def lunge_momentum(robot: Robot) -> float:
     constraints = np.vstack((kinematics.J_feet, kinematics.centroidal_map))
     per_momentum = ease * np.linalg.pinv(constraints * ease, rcond=1e-6)[:, -2]
     return 1.0 / float(np.abs(per_momentum[: robot.arms.start]).max())
+
+
+def _stoppable(way: float) -> float:
+    """Speed of a lunge (rad/s) that can be stopped within ``way`` (rad)."""
+    return min(FASTEST_LUNGE, math.sqrt(2.0 * STOPPING_LUNGE * max(0.0, way)))
 
 
 def _within(value: float, bound: float) -> float:

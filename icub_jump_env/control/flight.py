@@ -30,7 +30,7 @@ MOMENTUM_SHARE = 0.5
 """How much of the angular momentum becomes speed of the CoM at touch-down."""
 PLACEMENT_TIME = 0.015
 """Time constant of the filter on the placement (s)."""
-FARTHEST = np.array([0.09, 0.03])
+FARTHEST = 0.09, 0.03
 """Largest placement of the soles, forward and lateral (m)."""
 SPEED_SHARE = 0.95
 """Share of the speed limits that corrections, and commands, use."""
@@ -152,7 +152,7 @@ class FeedbackFlight:
         self._inverse_inertia = np.eye(3)
         self._rest = np.zeros(3)
         self._spread = np.zeros((2, 3))
-        self._placement = np.zeros(2)
+        self._placement = [0.0, 0.0]
         self._reach = self._yielded = self.yielding = 0.0
 
     def start(self, state: RobotState, plan: JumpPlan, time: float) -> None:
@@ -166,7 +166,7 @@ class FeedbackFlight:
         soles = self._stance.sole_positions
         self._rest[:] = self._stance.com - soles.mean(axis=0)
         self._spread[:] = soles - soles.mean(axis=0)
-        self._placement[:] = 0.0
+        self._placement = [0.0, 0.0]
         self._reach = self._yielded = self.yielding = 0.0
         self._residual.reset()
 
@@ -174,14 +174,14 @@ class FeedbackFlight:
         """One control tick, as :class:`icub_jump_env.control.phases.PhaseController`."""
         self._residual.step(residual_target, self._dt)
         # As one rigid body: what the legs do to the base comes back as an echo.
-        spin = self._inverse_inertia @ (state.angular_momentum @ state.base_rotation)
-        rotation = state.base_rotation @ pin.exp3(LEAD * spin)
+        spin = self._inverse_inertia.dot(state.angular_momentum.dot(state.base_rotation))
+        rotation = state.base_rotation.dot(pin.exp3(LEAD * spin))
         # The soles turn with the robot, about the vertical alone.
         cos, sin = heading(rotation)
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         self._place(state)
-        soles = self._spread @ turn.T - self.setpoint.com_position
-        legs = self._legs.step(self._posture, soles @ rotation, rotation.T @ turn)
+        soles = self._spread.dot(turn.T) - self.setpoint.com_position
+        legs = self._legs.step(self._posture, soles.dot(rotation), rotation.T.dot(turn))
         joints = self._legs.joints
         rate, fastest = self._rate[joints], self._fastest[joints]
         np.subtract(legs, self._posture[joints], out=rate)
@@ -217,17 +217,18 @@ class FeedbackFlight:
     def _place(self, state: RobotState) -> None:
         """Set where the CoM shall be relative to the soles at touch-down."""
         height = float(self._rest[2])
-        H = state.angular_momentum
-        placement = np.array([H[1], -H[0]]) * (MOMENTUM_SHARE / (self._mass * height))
-        placement += state.com_velocity[:2]
-        placement *= math.sqrt(height / GRAVITY)
-        np.minimum(np.maximum(placement, -FARTHEST, out=placement), FARTHEST, out=placement)
+        Hx, Hy, _ = state.angular_momentum.tolist()
+        vx, vy, _ = state.com_velocity.tolist()
+        lever, time = MOMENTUM_SHARE / (self._mass * height), math.sqrt(height / GRAVITY)
         share = min(1.0, self._dt / PLACEMENT_TIME)
-        self._placement += share * (placement - self._placement)
+        for axis, speed in enumerate((vx + lever * Hy, vy - lever * Hx)):
+            wanted = min(max(time * speed, -FARTHEST[axis]), FARTHEST[axis])
+            self._placement[axis] += share * (wanted - self._placement[axis])
         self._reach_for_ground(state, height)
         com = self.setpoint.com_position
         np.add(self._rest, self._residual.offset, out=com)
-        com[:2] -= self._placement
+        com[0] -= self._placement[0]
+        com[1] -= self._placement[1]
         com[2] += EXTENSION * self._reach - self._yielded
 
     def _reach_for_ground(self, state: RobotState, height: float) -> None:

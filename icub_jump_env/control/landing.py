@@ -12,10 +12,9 @@ from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.config import SolverName
 from icub_jump_env.control.flight import Flight
 from icub_jump_env.control.phases import PhaseController, Tick
-from icub_jump_env.control.tasks.com import ComVelocity
+from icub_jump_env.control.tasks.centroidal import CentroidalVelocity
 from icub_jump_env.control.tasks.feet import SolesApart
 from icub_jump_env.control.tasks.limits import VelocityLimits
-from icub_jump_env.control.tasks.momentum import MomentumIntegral
 from icub_jump_env.control.tasks.posture import PostureVelocity
 from icub_jump_env.control.tasks.smoothness import VelocitySmoothness
 from icub_jump_env.control.tasks.stack import TaskQP
@@ -117,24 +116,25 @@ class FeedbackLanding:
             [robot.joint_names.index(f"{side}_ankle_{axis}") for side in "lr"]
             for axis in ("pitch", "roll")
         )
-        self._ankle_pitch, self._ankles = np.array(pitch), np.array(pitch + roll)
-        self._servoed = np.full(n, np.nan)
+        self._ankle_pitch, self._ankles = pitch, np.array(pitch + roll)
+        # NaN leaves a joint to its servo.
+        self._damping = np.full(n, np.nan)
+        self._damping[self._ankles] = ANKLE_DAMPING
         self._catch = Catch(kinematics, dt)
         self._soles_apart = SolesApart(kinematics)
         self._velocity = np.zeros(n)
+        centroidal = CentroidalVelocity(kinematics, COM_WEIGHT, MOMENTUM_WEIGHT)
         self._qp = TaskQP(
-            n,
+            n + centroidal.size,
             costs=[
                 PostureVelocity(POSTURE_GAIN, robot.per_joint("posture", POSTURE_WEIGHT)),
                 VelocitySmoothness(
                     robot.per_joint("smoothness", SMOOTHNESS_WEIGHT), self._velocity
                 ),
+                centroidal,
             ],
-            soft=[
-                ComVelocity(kinematics, 0.0, COM_WEIGHT),
-                MomentumIntegral(kinematics, 0.0, MOMENTUM_WEIGHT, np.zeros(3)),
-            ],
-            hard=[self._soles_apart],
+            soft=[],
+            hard=[centroidal, self._soles_apart],
             limits=[VelocityLimits(robot, LIMIT_HORIZON, SPEED_SHARE)],
             solver=solver,
         )
@@ -153,7 +153,7 @@ class FeedbackLanding:
         """Begin in ``state``, ``time`` (s) after the start of the jump."""
         self._began, self._crouch = time, None
         self.setpoint.posture_velocity[:] = 0.0
-        self._stand[:] = plan.landing_posture
+        self.setpoint.posture[:] = self._stand[:] = plan.landing_posture
         stance = FeetFixedKinematics(self._robot)
         stance.update(self._stand)
         self._stand_height = float(stance.com[2])
@@ -173,22 +173,22 @@ class FeedbackLanding:
         kinematics, setpoint, dt = self._kinematics, self.setpoint, self._dt
         s, s_dot = state.joint_position, state.joint_velocity
         self._residual.step(residual_target, dt)
-        offset = self._residual.offset
+        x, y, z = self._residual.offset.tolist()
         forward, height, rise = self._stand_at(time)
         # The ankles are where balance has them, and the soles tell what is level.
         setpoint.posture[self._ankles] = self._position[self._ankles] = s[self._ankles]
-        setpoint.com_position[:] = forward + offset[0], offset[1], height + offset[2]
-        lag = height + offset[2] - kinematics.com[2]
+        com = setpoint.com_position
+        com[0], com[1], com[2] = forward + x, y, height + z
+        lag = height + z - float(kinematics.com[2])
         setpoint.com_velocity[2] = rise + self._residual.velocity[2] + HEIGHT_GAIN * lag
-        away = self._position - setpoint.posture
-        balance = self._catch.update(state, setpoint.com_position, away)
+        balance = self._catch.update(state, com, self._position - setpoint.posture)
         setpoint.angular_momentum[1] = balance.pitch_momentum
         self._soles_apart.speed = balance.lift
         solution, report = self._qp.solve(state, setpoint)
         if report.failed:
             self._velocity *= 0.8
         else:
-            self._velocity[:] = solution.x
+            self._velocity[:] = solution.x[: len(self._velocity)]
         position, step = self._position, s - self._position
         np.minimum(np.maximum(step, -LARGEST_LAG, out=step), LARGEST_LAG, out=step)
         step *= REFERENCE_LEAK
@@ -197,9 +197,10 @@ class FeedbackLanding:
         position += step
         np.minimum(np.maximum(position, self._lower, out=position), self._upper, out=position)
 
-        torque = self._servoed.copy()
-        torque[self._ankles] = ANKLE_DAMPING * (self._velocity - s_dot)[self._ankles]
-        torque[self._ankle_pitch] += np.maximum(state.foot_force, 0.0) * balance.cop
+        torque = self._damping * (self._velocity - s_dot)
+        (left, right), (on_left, on_right) = self._ankle_pitch, state.foot_force.tolist()
+        torque[left] += max(on_left, 0.0) * balance.cop
+        torque[right] += max(on_right, 0.0) * balance.cop
         command = JointCommand(self._velocity.copy(), self._position.copy(), torque)
         return Tick(command, report)
 
@@ -214,9 +215,8 @@ class FeedbackLanding:
         self._crouch, self._crouch_began = MinimumJerk(start, goal, CROUCH_TIME), time
 
     def _stand_at(self, time: float) -> tuple[float, float, float]:
-        """Set the posture; place of the CoM forward (m), its height (m) and rate (m/s)."""
+        """Place of the CoM forward (m), its height (m) and rate (m/s); moves the posture."""
         if self._crouch is None:
-            self.setpoint.posture[:] = self._stand
             return 0.0, *self._height(time - self._began)
         now, rate = self._crouch.sample(time - self._crouch_began)
         self.setpoint.posture[:] = now[:-2]

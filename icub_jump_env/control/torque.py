@@ -88,7 +88,7 @@ class TorqueController:
             n,
             costs=[
                 PostureAcceleration(
-                    config.posture_stiffness, config.posture_damping, self._posture_weight, n
+                    config.posture_stiffness, config.posture_damping, self._posture_weight
                 ),
                 SmallWrenches(config.wrench_weight, robot.n_joints),
             ],

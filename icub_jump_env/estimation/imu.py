@@ -62,7 +62,6 @@ class ImuEstimator:
             joint_position=np.zeros(n),
             joint_velocity=np.zeros(n),
             base_rotation=np.eye(3),
-            angular_velocity=np.zeros(3),
             com=np.zeros(3),
             com_velocity=np.zeros(3),
             angular_momentum=np.zeros(3),
@@ -95,9 +94,9 @@ class ImuEstimator:
         state.joint_position[:] = readings.joint_position
         state.joint_velocity[:] = readings.joint_velocity
         state.foot_force[:] = readings.foot_force
-        angular_velocity = self._base_R_imu @ readings.gyro
+        angular_velocity = self._base_R_imu.dot(readings.gyro)
         if self._readings:
-            self._navigate(angular_velocity, self._base_R_imu @ readings.accelerometer)
+            self._navigate(angular_velocity, self._base_R_imu.dot(readings.accelerometer))
         else:
             state.base_rotation[:] = kinematics.base_rotation
             self._base_position[:] = kinematics.base_position
@@ -105,7 +104,7 @@ class ImuEstimator:
             self._footholds[:] = state.sole_position
         self._readings += 1
         self._base_twist[3:] = angular_velocity
-        self._correct_attitude(self._base_R_imu @ readings.gravity)
+        self._correct_attitude(self._base_R_imu.dot(readings.gravity))
         self._place_soles()
         self._stand()
         self._conclude()
@@ -117,10 +116,10 @@ class ImuEstimator:
         R, velocity = state.base_rotation, self._base_velocity
         turn = (angular_velocity + self._base_twist[3:]) * (0.5 * dt)
         # The specific force is a mean over the period: it belongs to the middle of it.
-        gained = R @ (pin.exp3(0.5 * turn) @ specific_force)
+        gained = R.dot(pin.exp3(0.5 * turn).dot(specific_force))
         gained += GRAVITY * state.gravity
         gained *= dt
-        R[:] = R @ pin.exp3(turn)
+        R[:] = R.dot(pin.exp3(turn))
         self._base_position += dt * (velocity + 0.5 * gained)
         velocity += gained
 
@@ -129,17 +128,17 @@ class ImuEstimator:
         kinematics, state = self._kinematics, self._state
         R = state.base_rotation
         # Whoever lands turned about the vertical stands as flat as before.
-        sole_turn = R @ pin.log3(R.T @ kinematics.base_rotation)
+        sole_turn = R.dot(pin.log3(R.T.dot(kinematics.base_rotation)))
         sole_turn[2] = 0.0
         tilt = math.hypot(sole_turn[0], sole_turn[1]) / FLATNESS
         flat = self._load(float(state.foot_force[0]), 0.5) * math.exp(-tilt * tilt)
         if not self._has_flown:
             share = flat / min(self._readings, AVERAGED)
-            state.gravity += share * (kinematics.base_rotation @ down - state.gravity)
-            state.gravity /= np.linalg.norm(state.gravity)
+            state.gravity += share * (kinematics.base_rotation.dot(down) - state.gravity)
+            state.gravity /= math.hypot(*state.gravity)
         turn = self._share(FLAT_GAIN * flat) * sole_turn
-        turn += self._share(TILT_GAIN * (1.0 - flat)) * np.cross(R @ down, state.gravity)
-        R[:] = pin.exp3(turn) @ R
+        turn += self._share(TILT_GAIN * (1.0 - flat)) * pin.skew(R.dot(down)).dot(state.gravity)
+        R[:] = pin.exp3(turn).dot(R)
 
     def _place_soles(self) -> None:
         kinematics, state = self._kinematics, self._state
@@ -153,32 +152,29 @@ class ImuEstimator:
     def _stand(self) -> None:
         """Correct velocity and position by the soles that carry load."""
         kinematics, state = self._kinematics, self._state
-        load = self._load(float(state.foot_force.sum()))
+        left, right = state.foot_force.tolist()
+        load = self._load(left + right)
         if load == 0.0:
             self._airborne = self._has_flown = True
             return
         if self._airborne:
             self._touch_down()
         taken = self._share(CONTACT_GAIN * load)
-        shares = np.maximum(state.foot_force, 0.0)
-        shares[shares < NO_LOAD * shares.sum()] = 0.0
-        shares /= shares.sum()
-        velocity, position = np.zeros(3), np.zeros(3)
-        omega = self._base_twist[3:]
+        velocity, omega = np.zeros(3), self._base_twist[3:]
+        shares = _shares(left, right)
         for foot, share in enumerate(shares):
             if share == 0.0:
                 self._footholds[foot] = state.sole_position[foot]
                 continue
             jacobian = (kinematics.J_left, kinematics.J_right)[foot]
-            twist = jacobian @ state.joint_velocity[self._legs[foot]]
-            sole = self._soles[foot]
+            twist = jacobian.dot(state.joint_velocity[self._legs[foot]])
             # Of the base, in its own axes, if this sole stands still.
-            velocity -= share * (twist[:3] + pin.skew(omega + twist[3:]) @ sole)
-            position += share * (self._footholds[foot] - state.sole_position[foot])
-        wanted = state.base_rotation @ velocity
+            velocity -= share * (twist[:3] + pin.skew(omega + twist[3:]).dot(self._soles[foot]))
+        wanted = state.base_rotation.dot(velocity)
         self._base_velocity += taken * (wanted - self._base_velocity)
-        self._base_position += taken * position
-        state.sole_position += taken * position
+        shift = taken * np.dot(shares, self._footholds - state.sole_position)
+        self._base_position += shift
+        state.sole_position += shift
 
     def _touch_down(self) -> None:
         """What touches first is on the floor."""
@@ -193,11 +189,10 @@ class ImuEstimator:
         """CoM and momentum, in the air with what is known of their motion."""
         kinematics, state = self._kinematics, self._state
         R = state.base_rotation
-        np.dot(R, self._base_twist[3:], out=state.angular_velocity)
         np.dot(self._base_velocity, R, out=self._base_twist[:3])
-        momentum = kinematics.A_base @ self._base_twist
-        momentum += kinematics.A_joints @ state.joint_velocity
-        velocity, angular_momentum = R @ momentum[:3] / kinematics.mass, R @ momentum[3:]
+        momentum = kinematics.A_base.dot(self._base_twist)
+        momentum += kinematics.A_joints.dot(state.joint_velocity)
+        velocity, angular_momentum = R.dot(momentum[:3]) / kinematics.mass, R.dot(momentum[3:])
         if self._airborne:
             # Only pushes change these.
             share = self._share(BALLISTIC_GAIN)
@@ -218,3 +213,10 @@ class ImuEstimator:
     def _share(self, gain: float) -> float:
         """What a correction with a gain (1/s) takes off an error within one period."""
         return 1.0 - math.exp(-gain * self._dt)
+
+
+def _shares(left: float, right: float) -> tuple[float, float]:
+    """How far each sole counts, given their normal forces (N): not at all without load."""
+    least = NO_LOAD * (max(left, 0.0) + max(right, 0.0))
+    left, right = (force if force > least else 0.0 for force in (left, right))
+    return left / (left + right), right / (left + right)

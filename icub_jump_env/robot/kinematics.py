@@ -102,7 +102,7 @@ class FeetFixedKinematics:
         middle = np.array([robot.sole.center_x, 0.0, robot.sole.bottom])
         self.ankle_p_soles = [frame.placement.act(middle) for frame in frames]
         chest = self.model.frames[self.model.getFrameId(robot.chest_link)]
-        self._base_M_spine = data.oMi[chest.parentJoint]
+        self._base_R_spine = data.oMi[chest.parentJoint].rotation
         self._spine_chest_up = chest.placement.rotation[:, 1].copy()
         placement = data.oMi[ankle]
         self._ankle_R_base, self._base_p_ankle = placement.rotation.T, placement.translation
@@ -140,7 +140,7 @@ class FeetFixedKinematics:
 
     def chest_up(self) -> Array:
         """(3,) the chest's up axis in the base frame: the y axis of its link."""
-        up: Array = self._base_M_spine.rotation @ self._spine_chest_up
+        up: Array = self._base_R_spine.dot(self._spine_chest_up)
         return up
 
     def com_shift(self, posture: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from icub_jump_env.robot.kinematics import build_pinocchio_model
 from icub_jump_env.robot.robot import Robot
@@ -35,32 +36,20 @@ class LegKinematics:
         self._lower = robot.lower_position[self.joints] + LIMIT_MARGIN
         self._upper = robot.upper_position[self.joints] - LIMIT_MARGIN
         self._regular = _DAMPING * np.eye(6)
-        frames = [self._model.frames[self._model.getFrameId(name)] for name in robot.sole_frames]
         middle = np.array([robot.sole.center_x, 0.0, robot.sole.bottom])
-        self._soles = [
-            (self._data.oMi[f.parentJoint], f.placement.act(middle), f.placement.rotation.copy())
-            for f in frames
-        ]
-        legs = slice(6 + self.joints.start, 6 + self.joints.stop)
-        # (leg, twist of its foot where that passes the base origin, joint)
-        self._J = self._data.J[:, legs].reshape(6, 2, 6).transpose(1, 0, 2)
+        self._com = self._data.com[0]
+        # Of each leg: ankle in the base, sole in the ankle, and Jacobian: the twist of its foot
+        # where that passes the base origin, of its joints.
+        self._feet = []
+        for name, leg in zip(robot.sole_frames, (robot.left_leg, robot.right_leg), strict=True):
+            frame = self._model.frames[self._model.getFrameId(name)]
+            sole = pin.SE3(frame.placement.rotation, frame.placement.act(middle))
+            J = self._data.J[:, 6 + leg.start : 6 + leg.stop]
+            self._feet.append((self._data.oMi[frame.parentJoint], sole, J))
 
     def __reduce__(self) -> tuple[type[LegKinematics], tuple[Robot]]:
         # The buffers are views of Pinocchio's; a step fills them anew.
         return LegKinematics, (self._robot,)
-
-    def place(self, posture: Array) -> tuple[Array, Array]:
-        """Where a posture ((n,) rad) has the soles.
-
-        Returns:
-            (2, 3) the middles of their undersides from the CoM (m), and (2, 3, 3) their
-            orientations, base frame.
-        """
-        self._q[7:] = posture
-        pin.jacobianCenterOfMass(self._model, self._data, self._q)
-        com = self._data.com[0]
-        positions = np.array([ankle.act(point) - com for ankle, point, _ in self._soles])
-        return positions, np.array([ankle.rotation @ turn for ankle, _, turn in self._soles])
 
     def step(self, posture: Array, soles: Array, orientation: Array) -> Array:
         """One Gauss-Newton step from a posture towards wanted soles.
@@ -76,15 +65,17 @@ class LegKinematics:
         Returns:
             (12,) positions of the leg joints (rad), within their limits.
         """
-        now, orientations = self.place(posture)
-        twists = np.empty((2, 6, 1))
-        for foot in range(2):
-            turn = pin.log3(orientation @ orientations[foot].T)
-            shift = soles[foot] - now[foot] + pin.skew(now[foot] + self._data.com[0]) @ turn
-            twists[foot, :3, 0], twists[foot, 3:, 0] = shift, turn
-        J, J_T = self._J, self._J.transpose(0, 2, 1)
-        step = np.linalg.solve(J_T @ J + self._regular, J_T @ twists).reshape(12)
-        np.minimum(np.maximum(step, -_LARGEST_STEP, out=step), _LARGEST_STEP, out=step)
-        step += posture[self.joints]
-        legs: Array = np.minimum(np.maximum(step, self._lower, out=step), self._upper, out=step)
+        self._q[7:] = posture
+        pin.jacobianCenterOfMass(self._model, self._data, self._q)
+        steps, twist = np.empty((2, 6)), np.empty(6)
+        for foot, (ankle, sole, J) in enumerate(self._feet):
+            now = ankle * sole
+            turn, position = pin.log3(orientation.dot(now.rotation.T)), now.translation
+            twist[:3] = soles[foot] - position + self._com + pin.skew(position).dot(turn)
+            twist[3:] = turn
+            _, steps[foot], _ = dposv(J.T.dot(J) + self._regular, J.T.dot(twist))
+        legs = steps.reshape(12)
+        np.minimum(np.maximum(legs, -_LARGEST_STEP, out=legs), _LARGEST_STEP, out=legs)
+        legs += posture[self.joints]
+        np.minimum(np.maximum(legs, self._lower, out=legs), self._upper, out=legs)
         return legs

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from standing import GRAVITY, ROBOT, N, Oracle, Standing
 
 from icub_jump_env.control.config import ContactConfig
+from icub_jump_env.control.tasks.centroidal import CentroidalVelocity
 from icub_jump_env.control.tasks.com import ComAcceleration, ComVelocity
 from icub_jump_env.control.tasks.contact import ContactLimits, SmallWrenches, contact_rows
 from icub_jump_env.control.tasks.feet import FeetAcceleration, FeetVelocity, SolesApart
@@ -229,7 +230,7 @@ COSTS = {
         N,
     ),
     "first term of (6a)": (
-        lambda c: PostureAcceleration(12.0, 5.0, c.weights, N + 12),
+        lambda c: PostureAcceleration(12.0, 5.0, c.weights),
         lambda c, x: np.append(
             c.weights
             * (
@@ -367,6 +368,35 @@ class TestLimits:
         assert (problem.lower[: N + 12][normal] == 17.0).all()
         assert (problem.lower[: N + 12][~normal] < -1e5).all()
         assert (problem.upper[: N + 12] > 1e5).all()
+
+
+def test_with_its_residual_unknown_an_equation_is_soft():
+    """The same solution as that of (3b) and (3d) without feedback as costs."""
+    case = Case(2)
+    kinematics, posture = case.kinematics, PostureVelocity(2.0, case.weights)
+    centroidal, apart = CentroidalVelocity(kinematics, 30.0, 20.0), SolesApart(kinematics)
+    momentum = MomentumIntegral(kinematics, 0.0, 20.0, np.zeros(3))
+    soft = TaskQP(
+        N,
+        costs=[posture],
+        soft=[ComVelocity(kinematics, 0.0, 30.0), momentum],
+        hard=[apart],
+        limits=[],
+        solver="daqp",
+    )
+    residual_unknown = TaskQP(
+        N + 6,
+        costs=[posture, centroidal],
+        soft=[],
+        hard=[centroidal, apart],
+        limits=[],
+        solver="daqp",
+    )
+    expected, x = (qp.solve(case.state, case.wanted)[0].x for qp in (soft, residual_unknown))
+    np.testing.assert_allclose(x[:N], expected, atol=1e-9)
+    wanted = np.concatenate((case.wanted.com_velocity, case.wanted.angular_momentum))
+    np.testing.assert_allclose(x[N:], wanted - kinematics.centroidal_map @ expected, atol=1e-9)
+    assert np.abs(x[N:]).max() > 1e-3
 
 
 @pytest.mark.parametrize("speed", [-0.2, 0.0, 0.3])

@@ -30,33 +30,26 @@ def soles_of(posture, robot=ROBOT):
 
 
 @pytest.mark.parametrize("name", ["iCubGazeboV2_7", "iCubGenova02"])
-def test_where_a_posture_has_the_soles(name, rng):
-    robot = load_robot(name)
-    posture = robot.landing + 0.1 * rng.normal(size=robot.n_joints)
-    for ours, theirs in zip(
-        LegKinematics(robot).place(posture), soles_of(posture, robot), strict=True
-    ):
-        np.testing.assert_allclose(ours, theirs, atol=1e-12)
-
-
 @settings(max_examples=20)
-@given(st.integers(0, 10_000))
-def test_steps_converge_to_soles_that_can_be_reached(seed):
-    rng = np.random.default_rng(seed)
-    shift = rng.uniform([-0.05, -0.02, -0.03], [0.05, 0.02, 0.02])
+@given(seed=st.integers(0, 10_000))
+def test_steps_converge_to_soles_that_can_be_reached(name, seed):
+    robot = load_robot(name)
+    legs, rng = LegKinematics(robot), np.random.default_rng(seed)
+    # Forward the ankles would have to bend beyond their limit.
+    shift = rng.uniform([-0.05, -0.02, -0.03], [0.0, 0.02, 0.02])
     turn = pin.exp3(rng.uniform(-0.15, 0.15, 3) * [0.3, 1.0, 0.3])
-    soles, orientations = soles_of(ROBOT.landing)
-    posture, errors = ROBOT.landing.copy(), []
+    soles, orientations = soles_of(robot.landing, robot)
+    posture, errors = robot.landing.copy(), []
     for _ in range(12):
-        posture[LEGS.joints] = LEGS.step(posture, soles + shift, turn @ orientations[0])
-        now, turned = soles_of(posture)
+        posture[legs.joints] = legs.step(posture, soles + shift, turn @ orientations[0])
+        now, turned = soles_of(posture, robot)
         errors.append(np.abs(now - soles - shift).max())
     assert errors[-1] < 1e-5
     assert errors[3] < 0.1 * errors[0] + 1e-6
     for orientation in turned:
         np.testing.assert_allclose(orientation, turn @ orientations[0], atol=1e-4)
-    still = np.delete(np.arange(ROBOT.n_joints), np.arange(12))
-    np.testing.assert_array_equal(posture[still], ROBOT.landing[still])
+    still = np.delete(np.arange(robot.n_joints), np.arange(12))
+    np.testing.assert_array_equal(posture[still], robot.landing[still])
 
 
 def test_out_of_reach_the_legs_stay_within_their_limits_and_steps_are_bounded():

@@ -42,7 +42,8 @@ class SolesApart(FeetVelocity):
 
     def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
         """Write the equation; its rows have the left foot minus the right one, base axes."""
-        super().write(state, setpoint, rows, target)
+        J_feet = self._kinematics.J_feet
+        rows[:, : J_feet.shape[1]] = J_feet
         np.multiply(self._kinematics.base_rotation[2], -self.speed, out=target[:3])
 
 

@@ -29,14 +29,17 @@ class VelocityLimits(Limit):
         """
         self._fastest = robot.velocity_limit * margin
         self._slowest = -self._fastest
-        self._horizon = horizon
+        self._horizon, self._n = horizon, robot.n_joints
         self._lowest = robot.lower_position / horizon
         self._highest = robot.upper_position / horizon
 
     def write(self, state: RobotState, buffers: LimitBuffers) -> None:
         """Write the bounds of the joint velocities."""
         rate = state.joint_position / self._horizon
-        for limit, bound in ((self._lowest, buffers.lower), (self._highest, buffers.upper)):
+        for limit, bound in (
+            (self._lowest, buffers.lower[: self._n]),
+            (self._highest, buffers.upper[: self._n]),
+        ):
             np.subtract(limit, rate, out=bound)
             np.minimum(bound, self._fastest, out=bound)
             np.maximum(bound, self._slowest, out=bound)

@@ -38,19 +38,15 @@ class PostureAcceleration:
     which would feed the velocity back with the wrong sign.
     """
 
-    def __init__(self, stiffness: float, damping: float, weight: Array, n_variables: int) -> None:
+    def __init__(self, stiffness: float, damping: float, weight: Array) -> None:
         """Set up the task.
 
         Args:
             stiffness: K_p (1/s^2).
             damping: K_d (1/s).
             weight: (n,) diagonal of Lambda.
-            n_variables: Number of unknowns, of which s_ddot are the first n.
         """
-        self._n = len(weight)
-        self.diagonal = np.zeros(n_variables)
-        self.diagonal[: self._n] = weight
-        self._weight, self._stiffness, self._damping = weight, stiffness, damping
+        self.diagonal, self._stiffness, self._damping = weight, stiffness, damping
 
     def subtract(self, state: RobotState, setpoint: Setpoint, gradient: Array) -> None:
         """Subtract Lambda s_ddot* from the gradient."""
@@ -60,5 +56,5 @@ class PostureAcceleration:
         error *= self._damping
         wanted -= error
         wanted += setpoint.posture_acceleration
-        wanted *= self._weight
-        gradient[: self._n] -= wanted
+        wanted *= self.diagonal
+        gradient -= wanted

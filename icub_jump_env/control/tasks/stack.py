@@ -54,9 +54,12 @@ class TaskQP:
         self.problem = problem = QuadraticProgram(n, n_rows, n_equalities)
         problem.lower[: n + n_rows], problem.upper[: n + n_rows] = -_UNBOUNDED, _UNBOUNDED
         self._solver = CheckedSolver(solver, problem)
-        self._costs = costs
-        self._diagonal = np.sum([cost.diagonal for cost in costs], axis=0)
+        self._costs = [(cost, problem.g[: len(cost.diagonal)]) for cost in costs]
+        self._diagonal = np.zeros(n)
+        for cost in costs:
+            self._diagonal[: len(cost.diagonal)] += cost.diagonal
         self._H_diagonal = problem.H.reshape(-1)[:: n + 1]
+        self._H_diagonal[:] = self._diagonal  # for good, where no task is soft
 
         self._rows = np.zeros((sum(task.size for task in soft), n))
         self._target = np.zeros(len(self._rows))
@@ -102,15 +105,16 @@ class TaskQP:
     def pose(self, state: RobotState, setpoint: Setpoint) -> None:
         """Write all terms into the problem."""
         problem, rows, target = self.problem, self._rows, self._target
-        for task, task_rows, task_target in self._soft:
-            task.write(state, setpoint, task_rows, task_target)
-        np.matmul(rows.T, rows, out=problem.H)
-        self._H_diagonal += self._diagonal
         gradient = problem.g
         gradient.fill(0.0)
-        for cost in self._costs:
-            cost.subtract(state, setpoint, gradient)
-        gradient -= target.dot(rows)
+        for cost, part in self._costs:
+            cost.subtract(state, setpoint, part)
+        for task, task_rows, task_target in self._soft:
+            task.write(state, setpoint, task_rows, task_target)
+        if self._soft:
+            np.matmul(rows.T, rows, out=problem.H)
+            self._H_diagonal += self._diagonal
+            gradient -= target.dot(rows)
 
         for limit, buffers in self._limits:
             limit.write(state, buffers)

@@ -35,16 +35,16 @@ class Task(Protocol):
 
 
 class DiagonalTask(Protocol):
-    """A cost 1/2 ||x - x*||^2 with a diagonal weight.
+    """A cost 1/2 ||x - x*||^2 of the first k unknowns x with a diagonal weight.
 
     Attributes:
-        diagonal: (n_variables,) the weight.
+        diagonal: (k,) the weight.
     """
 
     diagonal: Array
 
     def subtract(self, state: RobotState, setpoint: Setpoint, gradient: Array) -> None:
-        """Subtract the weighted x* from the gradient, (n_variables,)."""
+        """Subtract the weighted x* from the gradient, (k,)."""
         ...
 
 
