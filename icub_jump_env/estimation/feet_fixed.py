@@ -30,6 +30,7 @@ class FeetFixedEstimator:
             joint_position=np.zeros(n),
             joint_velocity=np.zeros(n),
             base_rotation=kinematics.base_rotation,
+            angular_velocity=np.zeros(3),
             com=kinematics.com,
             com_velocity=self._rates[:3],
             angular_momentum=self._rates[3:],
@@ -54,6 +55,8 @@ class FeetFixedEstimator:
         kinematics, state = self._kinematics, self._state
         kinematics.update(readings.joint_position)
         np.dot(kinematics.centroidal_map, readings.joint_velocity, out=self._rates)
+        base_twist = kinematics.J_left.dot(readings.joint_velocity[kinematics.robot.left_leg])
+        np.dot(kinematics.base_rotation, -base_twist[3:], out=state.angular_velocity)
         state.joint_position = readings.joint_position
         state.joint_velocity = readings.joint_velocity
         state.foot_force = readings.foot_force

@@ -62,6 +62,7 @@ class ImuEstimator:
             joint_position=np.zeros(n),
             joint_velocity=np.zeros(n),
             base_rotation=np.eye(3),
+            angular_velocity=np.zeros(3),
             com=np.zeros(3),
             com_velocity=np.zeros(3),
             angular_momentum=np.zeros(3),
@@ -189,6 +190,7 @@ class ImuEstimator:
         """CoM and momentum, in the air with what is known of their motion."""
         kinematics, state = self._kinematics, self._state
         R = state.base_rotation
+        np.dot(R, self._base_twist[3:], out=state.angular_velocity)
         np.dot(self._base_velocity, R, out=self._base_twist[:3])
         momentum = kinematics.A_base.dot(self._base_twist)
         momentum += kinematics.A_joints.dot(state.joint_velocity)

@@ -21,6 +21,7 @@ class RobotState:
         joint_position: (n,) s (rad).
         joint_velocity: (n,) rad/s.
         base_rotation: (3, 3) orientation of the base.
+        angular_velocity: (3,) of the base (rad/s).
         com: (3,) CoM position x (m).
         com_velocity: (3,) CoM velocity (m/s).
         angular_momentum: (3,) centroidal angular momentum H_omega (kg m^2/s).
@@ -32,6 +33,7 @@ class RobotState:
     joint_position: Array
     joint_velocity: Array
     base_rotation: Array
+    angular_velocity: Array
     com: Array
     com_velocity: Array
     angular_momentum: Array

@@ -1,6 +1,7 @@
 """What the paper's estimator says beside CoM and momentum, by finite differences."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from motions import BOTH, ROBOT, MadeUp
 
@@ -17,6 +18,15 @@ def motion(rng):
 @pytest.fixture
 def kinematics():
     return FeetFixedKinematics(ROBOT)
+
+
+def test_angular_velocity_is_that_of_the_base(motion, kinematics):
+    estimator, e = FeetFixedEstimator(kinematics), 1e-5
+    before, after = motion.base(0.1 - e)[0], motion.base(0.1 + e)[0]
+    state = estimator.estimate(motion.readings(0.1))
+    expected = pin.log3(after @ before.T) / (2 * e)
+    assert np.linalg.norm(expected) > 0.1
+    np.testing.assert_allclose(state.angular_velocity, expected, atol=1e-7)
 
 
 def test_com_velocity_is_the_derivative_of_the_com(motion, kinematics):

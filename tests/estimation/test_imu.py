@@ -14,6 +14,7 @@ from motions import (
     R0,
     REST,
     ROBOT,
+    TO_IMU,
     WEIGHT,
     MadeUp,
     Recorded,
@@ -44,7 +45,7 @@ class TestOnTheFeet:
         np.testing.assert_allclose(ours.sole_position[0], theirs.sole_position[0], atol=1e-9)
         for name in ("base_rotation", "com", "gravity", "joint_position"):
             np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), atol=1e-9)
-        for name in ("com_velocity", "angular_momentum"):
+        for name in ("com_velocity", "angular_momentum", "angular_velocity"):
             np.testing.assert_allclose(getattr(ours, name), 0.0, atol=1e-9)
         np.testing.assert_array_equal(ours.foot_force, BOTH)
 
@@ -70,6 +71,8 @@ class TestOnTheFeet:
         np.testing.assert_allclose(left.com, com, atol=2e-4)
         np.testing.assert_allclose(left.com_velocity, velocity, atol=1e-4)
         np.testing.assert_allclose(left.angular_momentum, momentum, atol=1e-3)
+        omega = motion.base(0.5 - DT)[0] @ TO_IMU @ motion.readings(0.5 - DT).gyro
+        np.testing.assert_allclose(left.angular_velocity, omega, atol=1e-6)
 
     @pytest.mark.parametrize("force", [(0.95, 0.05), (0.95, -0.05), (0.3, 0.0)])
     @pytest.mark.parametrize("foot", [0, 1])
