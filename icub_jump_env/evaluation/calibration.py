@@ -21,10 +21,10 @@ def calibrate(family: PlanFamily) -> PlanFamily:
     """The family whose rises are medians of jumps instead of plans.
 
     Plans with which a jump falls are left out; so are those of a branch that rise no higher than
-    a lower plan of it.
+    a lower plan of it, and branches of which fewer than two plans are left.
 
     Raises:
-        PlanningError: If fewer than two plans of a branch are left.
+        PlanningError: If no branch is left.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "family.npz"
@@ -50,13 +50,14 @@ def calibrate(family: PlanFamily) -> PlanFamily:
         for index in np.flatnonzero(family.branch == branch):
             kept[index] &= rise[index] > best
             best = max(best, rise[index]) if kept[index] else best
+        if kept[family.branch == branch].sum() < 2:
+            kept[family.branch == branch] = False
+    if not kept.any():
+        raise PlanningError("no branch has two plans that land")
     plans = [
         {**plan, "rise": round(float(value), 6)}
         for plan, value, keep in zip(family.card["plans"], rise, kept, strict=True)
         if keep
     ]
-    for branch in np.unique(family.branch):
-        if (family.branch[kept] == branch).sum() < 2:
-            raise PlanningError(f"branch {branch} has fewer than two plans that land")
     arrays = {name: getattr(family, name)[kept] for name in ARRAYS if name != "rise"}
     return PlanFamily(rise=rise[kept], **arrays, card={**family.card, "plans": plans})
