@@ -34,10 +34,14 @@ FARTHEST = 0.09, 0.03
 """Largest placement of the soles, forward and lateral (m)."""
 SPEED_SHARE = 0.95
 """Share of the speed limits that corrections, and commands, use."""
-EXTENSION, EXTENSION_TIME, OVERSHOOT_TIME = 0.03, 0.05, 0.02
-"""How far (m) the legs reach for the ground, how long that takes, and how long the knees then go on
-by themselves: no torque turns them around at once (s)."""
-YIELD_TIME, YIELD_SHARE, FARTHEST_YIELD = 0.06, 0.6, 0.04
+EXTENSION, EXTENSION_TIME = 0.03, 0.05
+"""How far (m) the legs reach for the ground, and how long that takes (s)."""
+OVERSHOOT_TIME = 0.01
+"""How long they wait then (s), because no torque turns the knees around at once."""
+CALM_PLACEMENT, CALM_MOMENTUM = 0.02, 0.3
+"""They wait where soles need no farther placement (m) and the robot turns with no more momentum
+(kg m^2/s): it lands softer, but then stands lower, and is harder to catch."""
+YIELD_TIME, YIELD_SHARE, FARTHEST_YIELD = 0.06, 0.8, 0.04
 """How long before touch-down the legs begin to give way (s), up to which share of the speed of
 the fall, and how far (m) if the ground does not come."""
 FARTHEST_BACK = 0.02
@@ -236,7 +240,10 @@ class FeedbackFlight:
         fall = max(0.0, float(state.com[2]) - height - EXTENSION)
         impact = math.sqrt(speed * speed + 2.0 * GRAVITY * fall)
         left = (speed + impact) / GRAVITY
-        if left < EXTENSION_TIME + OVERSHOOT_TIME + YIELD_TIME:
+        turning, placement = abs(float(state.angular_momentum[1])), abs(self._placement[0])
+        calm = turning < CALM_MOMENTUM and placement < CALM_PLACEMENT
+        wait = OVERSHOOT_TIME if calm else 0.0
+        if left < EXTENSION_TIME + wait + YIELD_TIME:
             self._reach = min(1.0, self._reach + self._dt / EXTENSION_TIME)
         if left < YIELD_TIME and self._placement[0] > -FARTHEST_BACK:
             fastest = YIELD_SHARE * impact
