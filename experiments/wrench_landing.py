@@ -42,16 +42,16 @@ class P:
     mom_k: float = 8.0
     mom_w: float = 10.0
     mshare: float = 0.5
-    pk: float = 40.0
-    pd: float = 12.0
+    pk: float = 10.0
+    pd: float = 6.0
     pw: tuple = (1.0, 1.0, 0.3)
     feet_k: float = 30.0
     feet_w: float = 300.0
     feet_hard: bool = False
-    wr: float = 1e-4
+    wr: float = 1e-3
     smooth: float = 1e-3
     mu: float = 0.4
-    cop_margin: float = 0.01
+    cop_margin: float = 0.003
     fmin: float = 5.0
     speed_h: float = 0.02
     lim_h: float = 0.06
@@ -61,6 +61,11 @@ class P:
     mode: str = "torque"
     lead: float = 0.0
     lunge: float = 1.0
+    slew: float = 30.0
+    side: float = 0.0
+    tors: float = 0.02
+    lat_h: float = 1.0
+    consistent: bool = True
     ankle: str = "qp"
     servo_ff: float = 1.0
     limp: float = 0.0
@@ -94,9 +99,9 @@ class WrenchLanding(FeedbackLanding):
         s = robot.sole
         m = p.cop_margin
         small = dataclasses.replace(
-            robot, sole=dataclasses.replace(s, x_min=s.x_min + m, x_max=s.x_max - m, half_width=s.half_width - m)
+            robot, sole=dataclasses.replace(s, x_min=s.x_min + m, x_max=s.x_max - m, half_width=s.half_width - m - p.side)
         )
-        contact = ContactConfig(friction=p.mu, minimum_force=p.fmin)
+        contact = ContactConfig(friction=p.mu, minimum_force=p.fmin, torsional_friction=p.tors)
         self._torque = np.zeros(n)
         self._rate = np.zeros(n)
         self._soles_apart = SolesDamped(kinematics, dyn, p.feet_k, p.feet_w)
@@ -149,9 +154,11 @@ class WrenchLanding(FeedbackLanding):
         away[self._ankles] = 0.0
         balance = self._catch.update(state, sp.com_position, away)
         sp.posture[self._ankles] = s[self._ankles] + sd[self._ankles] * 0.0
-        sp.angular_momentum[1] = p.lunge * balance.pitch_momentum
-        sp.angular_momentum_rate[1] = p.lunge * (balance.pitch_momentum - self._last_momentum) / dt
-        self._last_momentum = balance.pitch_momentum
+        goal = p.lunge * balance.pitch_momentum
+        hrate = float(np.clip((goal - self._last_momentum) / dt, -p.slew, p.slew))
+        self._last_momentum += hrate * dt
+        sp.angular_momentum[1] = self._last_momentum
+        sp.angular_momentum_rate[1] = hrate
         sp.com_acceleration[:] = self._com_acceleration(state, sp.com_position, balance, height, rise, time)
         sp.com_acceleration += GRAVITY - G * g
         self._soles_apart.speed = p.lift * balance.lift
@@ -203,7 +210,12 @@ class WrenchLanding(FeedbackLanding):
         pa = (ahead - f + va / w) * (1 + p.capture / w) + f
         pl = (left - l + vl / w) * (1 + p.lat / w) + l
         aa = float(np.clip(w * w * (ahead - pa), -p.amax, p.amax))
-        al = float(np.clip(w * w * (left - pl), -p.amax, p.amax))
+        if p.consistent:
+            cop = balance.cop - self._robot.sole.center_x
+            aa = w * w * (ahead - cop) - float(self.setpoint.angular_momentum_rate[1]) / (mass * h)
+            self.cmd_cop = cop
+        pl = l + float(np.clip(pl - l, -0.06, 0.06))
+        al = w * w * (left - pl)
         az = p.kz * (height - self._kin_height()) + p.dz * (rise - v[2]) + self._rise_rate(time)
         return np.array([cos * aa - sin * al, sin * aa + cos * al, az])
 
