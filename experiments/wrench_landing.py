@@ -42,11 +42,11 @@ class P:
     mom_k: float = 8.0
     mom_w: float = 10.0
     mshare: float = 0.5
-    pk: float = 10.0
-    pd: float = 6.0
+    pk: float = 5.0
+    pd: float = 4.5
     pw: tuple = (1.0, 1.0, 0.3)
     feet_k: float = 30.0
-    feet_w: float = 300.0
+    feet_w: float = 1000.0
     feet_hard: bool = False
     wr: float = 1e-3
     smooth: float = 1e-3
@@ -62,6 +62,7 @@ class P:
     lead: float = 0.0
     lunge: float = 1.0
     slew: float = 30.0
+    bridge: float = 0.04
     side: float = 0.0
     tors: float = 0.02
     lat_h: float = 1.0
@@ -104,15 +105,15 @@ class WrenchLanding(FeedbackLanding):
         contact = ContactConfig(friction=p.mu, minimum_force=p.fmin, torsional_friction=p.tors)
         self._torque = np.zeros(n)
         self._rate = np.zeros(n)
-        self._soles_apart = SolesDamped(kinematics, dyn, p.feet_k, p.feet_w)
+        self._damped = SolesDamped(kinematics, dyn, p.feet_k, p.feet_w)
         soft = [
             TorqueSmoothness(dyn, robot.per_joint("x", (p.smooth,) * 3), self._torque),
             ComAcceleration(dyn, 0.0, 0.0, p.com_w),
             MomentumRate(dyn, p.mom_k, p.mom_w),
         ]
         hard = [BaseMotion(dyn)]
-        (hard if p.feet_hard else soft).append(self._soles_apart)
-        self._qp = TaskQP(
+        (hard if p.feet_hard else soft).append(self._damped)
+        self._wqp = TaskQP(
             n + 12,
             costs=[
                 PostureAcceleration(p.pk, p.pd, robot.per_joint("x", p.pw), n + 12),
@@ -140,6 +141,11 @@ class WrenchLanding(FeedbackLanding):
 
     def tick(self, state, time, residual_target):
         p, k, sp, dt = self.p, self._kinematics, self.setpoint, self._dt
+        if time - self._began < p.bridge:
+            out = super().tick(state, time, residual_target)
+            self._last_momentum = float(sp.angular_momentum[1])
+            self._rate[:] = self._velocity
+            return out
         self._residual.step(residual_target, dt)
         offset = self._residual.offset
         forward, height, rise = self._stand_at(time)
@@ -161,11 +167,11 @@ class WrenchLanding(FeedbackLanding):
         sp.angular_momentum_rate[1] = hrate
         sp.com_acceleration[:] = self._com_acceleration(state, sp.com_position, balance, height, rise, time)
         sp.com_acceleration += GRAVITY - G * g
-        self._soles_apart.speed = p.lift * balance.lift
+        self._damped.speed = p.lift * balance.lift
         if self._fresh:
             self._fresh = False
-            self._qp.pose(state, sp)
-        solution, report = self._qp.solve(state, sp)
+            self._wqp.pose(state, sp)
+        solution, report = self._wqp.solve(state, sp)
         dyn = self._dynamics
         self.ticks += 1
         n = len(s)
