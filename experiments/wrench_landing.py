@@ -1,11 +1,13 @@
 """A whole-body QP with contact wrenches that lands the robot, against landing by feedback.
 
     python -m experiments.wrench_landing --episodes 20
+    python -m experiments.wrench_landing --realistic
+    python -m experiments.wrench_landing --parts
 
 The QP of eq. 6 decides the torques of all joints once the impact is over. Its demands come from the
 same capture point, lunge and heights as those of
-:class:`icub_jump_env.control.landing.FeedbackLanding`. The last table takes its parts away, one at
-a time. Gains were chosen on the first 40 of the tuning seeds, shown are the ones after them.
+:class:`icub_jump_env.control.landing.FeedbackLanding`. With ``--parts`` the QP loses its
+parts, one at a time. Gains were chosen on the first 40 of the tuning seeds; jumped are later ones.
 """
 
 from __future__ import annotations
@@ -66,6 +68,7 @@ from icub_jump_env.planning.residual import ResidualFilter
 from icub_jump_env.robot.dynamics import GRAVITY, FeetFixedDynamics
 from icub_jump_env.robot.frames import heading
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.simulation.actuators.config import ActuatorName
 
 Array = NDArray[np.float64]
 
@@ -96,9 +99,13 @@ class WrenchOptions:
 
     Attributes:
         episodes: Of each row.
+        realistic: With realistic actuators, whose torque loops have a bandwidth and friction.
+        parts: Take the parts of the QP away instead, one at a time.
     """
 
     episodes: int = 20
+    realistic: bool = False
+    parts: bool = False
 
     def __post_init__(self) -> None:
         check_count("episodes", self.episodes, 1, len(TUNING) - FIRST)
@@ -372,7 +379,7 @@ class Watched:
         return tick
 
 
-def wrench_landing(env: ICubJumpEnv, gains: WrenchGains) -> WrenchLanding:
+def landing_by_wrenches(env: ICubJumpEnv, gains: WrenchGains) -> WrenchLanding:
     """A landing that can take the place of the environment's, which is by feedback."""
     old = env._controller._landing
     if not isinstance(old, FeedbackLanding):
@@ -384,7 +391,7 @@ def wrench_landing(env: ICubJumpEnv, gains: WrenchGains) -> WrenchLanding:
 def watch(env: ICubJumpEnv, gains: WrenchGains | None) -> Watched:
     """Watch the landings of an environment; with ``gains`` they are those of the QP."""
     jumping = env._controller
-    watched = Watched(jumping._landing if gains is None else wrench_landing(env, gains))
+    watched = Watched(jumping._landing if gains is None else landing_by_wrenches(env, gains))
     jumping._controllers[Phase.LANDING] = watched
     return watched
 
@@ -422,7 +429,7 @@ def land(config: JumpConfig, used: Sequence[int], gains: WrenchGains | None) -> 
     return Landings(landed, force, watched.failures, float(np.median(watched.seconds)))
 
 
-def cases(controller: ControllerName) -> dict[str, JumpConfig]:
+def cases(controller: ControllerName, actuators: ActuatorName = "ideal") -> dict[str, JumpConfig]:
     """The jumps of one controller by name."""
 
     def name(case: LandingCase) -> str:
@@ -430,29 +437,39 @@ def cases(controller: ControllerName) -> dict[str, JumpConfig]:
 
     known = landing_cases(JumpConfig.of(controller=controller))
     chosen = [next(case for case in known if name(case).endswith(end)) for end in CASES]
-    return {
-        name(case): JumpConfig.of(controller=controller, **VARIANTS[FEEDBACK], **case.changes)
-        for case in chosen
-    }
+    always = {"controller": controller, "actuators": actuators, **VARIANTS[FEEDBACK]}
+    return {name(case): JumpConfig.of(**always, **case.changes) for case in chosen}
 
 
 def run(options: WrenchOptions) -> None:
-    """Compare the landings, then take away the parts of the QP."""
+    """Compare the landings, or take away the parts of the QP."""
     console, used = Console(), TUNING[FIRST : FIRST + options.episodes]
+    render = render_parts if options.parts else render_jumps
+    actuators: ActuatorName = "realistic" if options.realistic else "ideal"
     with progress_display(Console(stderr=True)) as progress:
         for controller in progress.track(CONTROLLERS):
-            compared = _table("jump", "landing", title=f"{controller} controller, {seeds(used)}")
-            jumps = cases(controller)
-            for label, config in jumps.items():
-                by_feedback, by_wrenches = (land(config, used, g) for g in (None, WrenchGains()))
-                compared.add_row(label, "feedback", *by_feedback.cells())
-                compared.add_row("", "wrench QP", *by_wrenches.cells(), end_section=True)
-            show(console, compared)
-            title = f"{controller} controller, {HARDEST} m/s, {seeds(used)}"
-            parts = _table("wrench QP", title=title)
-            for label, gains in PARTS.items():
-                parts.add_row(label, *land(jumps[HARDEST], used, gains).cells())
-            show(console, parts)
+            show(console, render(controller, actuators, used))
+
+
+def render_jumps(controller: ControllerName, actuators: ActuatorName, used: range) -> Table:
+    """Both landings in all cases."""
+    title = f"{controller} controller, {actuators} actuators, {seeds(used)}"
+    table = _table("jump", "landing", title=title)
+    for label, config in cases(controller, actuators).items():
+        table.add_row(label, "feedback", *land(config, used, None).cells())
+        found = land(config, used, WrenchGains())
+        table.add_row("", "wrench QP", *found.cells(), end_section=True)
+    return table
+
+
+def render_parts(controller: ControllerName, actuators: ActuatorName, used: range) -> Table:
+    """The QP without one of its parts, in a hard case."""
+    config = cases(controller, actuators)[HARDEST]
+    title = f"{controller} controller, {HARDEST} m/s, {actuators} actuators, {seeds(used)}"
+    table = _table("wrench QP", title=title)
+    for label, gains in PARTS.items():
+        table.add_row(label, *land(config, used, gains).cells())
+    return table
 
 
 def _table(*labels: str, title: str) -> Table:
