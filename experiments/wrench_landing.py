@@ -86,6 +86,9 @@ CASES = (
 )
 """Ends of the names of the landing study's cases that are jumped."""
 
+FEW = (CASES[0], CASES[1], CASES[4], CASES[7])
+"""Those that are jumped with realistic actuators."""
+
 HARDEST = "push after landing -0.3"
 """The case in which parts of the controller are taken away."""
 
@@ -159,8 +162,9 @@ class WrenchGains:
 PARTS: dict[str, WrenchGains] = {
     "all parts": WrenchGains(),
     "QP from touch-down on": WrenchGains(impact=0.0),
+    "feet as in the launch": WrenchGains(feet_damping=0.0, feet_weight=math.inf),
     "feet not damped": WrenchGains(feet_damping=0.0),
-    "feet as a constraint": WrenchGains(feet_weight=math.inf),
+    "damped as a constraint": WrenchGains(feet_weight=math.inf),
     "CoP margin 1 cm": WrenchGains(cop_margin=0.01),
     "no joint damping": WrenchGains(joint_damping=0.0),
     "loads not shared": WrenchGains(wrench_weight=1e-4),
@@ -436,7 +440,8 @@ def cases(controller: ControllerName, actuators: ActuatorName = "ideal") -> dict
         return f"{case.group} {case.label}".strip()
 
     known = landing_cases(JumpConfig.of(controller=controller))
-    chosen = [next(case for case in known if name(case).endswith(end)) for end in CASES]
+    ends = CASES if actuators == "ideal" else FEW
+    chosen = [next(case for case in known if name(case).endswith(end)) for end in ends]
     always = {"controller": controller, "actuators": actuators, **VARIANTS[FEEDBACK]}
     return {name(case): JumpConfig.of(**always, **case.changes) for case in chosen}
 
@@ -444,11 +449,13 @@ def cases(controller: ControllerName, actuators: ActuatorName = "ideal") -> dict
 def run(options: WrenchOptions) -> None:
     """Compare the landings, or take away the parts of the QP."""
     console, used = Console(), TUNING[FIRST : FIRST + options.episodes]
-    render = render_parts if options.parts else render_jumps
     actuators: ActuatorName = "realistic" if options.realistic else "ideal"
     with progress_display(Console(stderr=True)) as progress:
         for controller in progress.track(CONTROLLERS):
-            show(console, render(controller, actuators, used))
+            if options.parts:
+                show(console, render_parts(controller, used))
+            else:
+                show(console, render_jumps(controller, actuators, used))
 
 
 def render_jumps(controller: ControllerName, actuators: ActuatorName, used: range) -> Table:
@@ -462,10 +469,10 @@ def render_jumps(controller: ControllerName, actuators: ActuatorName, used: rang
     return table
 
 
-def render_parts(controller: ControllerName, actuators: ActuatorName, used: range) -> Table:
+def render_parts(controller: ControllerName, used: range) -> Table:
     """The QP without one of its parts, in a hard case."""
-    config = cases(controller, actuators)[HARDEST]
-    title = f"{controller} controller, {HARDEST} m/s, {actuators} actuators, {seeds(used)}"
+    config = cases(controller)[HARDEST]
+    title = f"{controller} controller, {HARDEST} m/s, {seeds(used)}"
     table = _table("wrench QP", title=title)
     for label, gains in PARTS.items():
         table.add_row(label, *land(config, used, gains).cells())
