@@ -152,7 +152,7 @@ def test_the_command_prints_both_controllers(parts, monkeypatch, capsys):
     monkeypatch.setattr(wrench_landing, "PARTS", dict(list(PARTS.items())[:1]))
     run(WrenchOptions(episodes=1, parts=parts))
     out = capsys.readouterr().out
-    assert re.findall(r"^(\w+) controller, .*seed 40 *$", out, re.M) == ["velocity", "torque"]
+    assert re.findall(r"^(\w+) controller, ", out, re.M) == ["velocity", "torque"]
     name = "all parts" if parts else "wrench QP"
     rows = re.findall(rf"{name} +([01])/1 +- +(\d+) +(\d+) +(\d+) *$", out, re.M)
     assert len(rows) == (2 if parts else 4)
