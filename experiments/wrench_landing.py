@@ -245,7 +245,7 @@ class WrenchLanding(FeedbackLanding):
             n + 12,
             costs=[
                 PostureAcceleration(
-                    *gains.posture, robot.per_joint("posture", gains.posture_weight), n + 12
+                    *gains.posture, robot.per_joint("posture", gains.posture_weight)
                 ),
                 SmallWrenches(gains.wrench_weight, n),
             ],
