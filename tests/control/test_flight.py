@@ -152,7 +152,7 @@ def falling(time, landing_at=0.2):
     return in_the_air(com=np.array([0.0, 0.0, height]), com_velocity=np.array([0.0, 0.0, speed]))
 
 
-def reach(backward=0.0):
+def reach(backward=0.0, momentum=0.0):
     """Length of the legs (m, over that of the landing posture) until touch-down is due."""
     flight = FeedbackFlight(ResidualFilter(15.0), DT, FeetFixedKinematics(ROBOT))
     flight.start(in_the_air(), PLAN, -1.0)
@@ -160,6 +160,7 @@ def reach(backward=0.0):
     for k in range(60):
         state = falling(k * DT - 0.05)
         state.com_velocity[0] = -backward
+        state.angular_momentum[1] = momentum
         flight.tick(state, k * DT - 0.05, NOTHING)
         lengths.append(flight.setpoint.com_position[2] - REST[2])
         yields.append(flight.yielding)
@@ -179,6 +180,15 @@ def test_legs_reach_for_the_ground_and_give_way_when_it_comes():
     assert flight_module.EXTENSION - lengths[-1] == pytest.approx(
         flight_module.FARTHEST_YIELD, abs=0.01
     )
+
+
+@pytest.mark.parametrize("disturbed", [{"momentum": 0.5}, {"momentum": -0.5}, {"backward": 0.15}])
+def test_only_a_calm_robot_waits_with_extended_legs(disturbed):
+    (calm, _), (hurried, _) = reach(), reach(**disturbed)
+    wait = round(flight_module.OVERSHOOT_TIME / DT)
+    assert wait > 0
+    begins = [int(np.flatnonzero(lengths > 0.0)[0]) for lengths in (calm, hurried)]
+    assert begins[1] - begins[0] == wait
 
 
 def test_legs_do_not_give_way_where_the_soles_are_far_behind():
