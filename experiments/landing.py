@@ -108,7 +108,7 @@ def render(controller: ControllerName, results: Sequence[LandingResult]) -> Tabl
     """The table of a controller."""
     table = new_table(
         2, "", "must", "aim", "hold, %", "feedback, %", "95 %", "points", "95 %", "p",
-        "force, %", "rise, cm",
+        "force, %", "rise, cm", "limits",
         title=f"Landings, {controller} controller, {seeds(LANDING_TEST)}",
     )  # fmt: skip
     for result in results:
@@ -128,13 +128,14 @@ def render(controller: ControllerName, results: Sequence[LandingResult]) -> Tabl
             f"{difference.p_value if p is None else p:.3f}",
             f"{100 * force:+.0f}",
             number(ours.mean_rise, "cm"),
+            number(ours.median("limit_violations"), "steps"),
         )
     table.caption = (
         "hold, feedback: share that landed and stands, with the interval of feedback; points: "
         "their difference, pairs of the same seed; p: McNemar, Holm-corrected over both "
         "controllers; force: median of the largest ground force after touch-down against hold; "
-        f"rise: mean of feedback; highest plan: {CM * HIGHEST[controller]:g} cm; units as in "
-        "eval.py --study landing"
+        "rise: mean of feedback; limits: median of its physics steps with a joint beyond a limit; "
+        f"highest plan: {CM * HIGHEST[controller]:g} cm; units as in eval.py --study landing"
     )
     return table
 

@@ -49,11 +49,12 @@ def test_all_jumps_of_a_series_must_land(landed, last, counts):
 
 def test_what_is_printed_of_a_row():
     case = next(c for c in rows(CONFIGS["torque"]) if c.label == "-4")
+    ours = {"landing_force": 1500.0, "flight_height": 0.0432, "limit_violations": 7}
     result = LandingResult.of(
         case,
         {
             "hold": outcomes("0" * 10 + "1" * 10, landing_force=2000.0, flight_height=0.05),
-            "feedback": outcomes("1" * 18 + "00", landing_force=1500.0, flight_height=0.0432),
+            "feedback": outcomes("1" * 18 + "00", **ours),
         },
     )
     console = Console(file=io.StringIO(), width=200)
@@ -64,7 +65,7 @@ def test_what_is_printed_of_a_row():
         *("-4", "85", "95", "50", "90"),
         *bounds.split(),
         *("+40.0", *row.split()[12:15], f"{result.against_hold['feedback'].p_value:.3f}"),
-        *("-25", "4.32"),
+        *("-25", "4.32", "7"),
     ]
 
 
