@@ -177,8 +177,7 @@ def jumps(
     )
     episodes = Series(config, used).complete(jobs, progress)
     landings = tuple(
-        dataclasses.replace(episode, is_success=bool(episode.jump["landed"]))
-        for episode in episodes
+        dataclasses.replace(episode, is_success=episode.landed) for episode in episodes
     )
     return Point(controller, world, planner, jump_height, displacement, landings)
 
@@ -260,7 +259,7 @@ def render_nominal(jobs: int, progress: Console) -> Table:
         rises = np.reshape([e.jump["flight_height"] for e in these], (len(CONTROLLERS), -1))
         medians = np.median(rises, axis=1)
         errors += list(np.abs(medians - height))
-        landed = np.mean([e.jump["landed"] for e in these])
+        landed = np.mean([e.landed for e in these])
         cells = (number(float(rise), "cm") for rise in medians)
         table.add_row(f"{CM * height:.2f}", *cells, number(float(landed), "%"))
     table.caption = (

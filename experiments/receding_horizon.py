@@ -355,7 +355,7 @@ def jump(
         episodes = [run_episode(env, seed) for seed in tracked]
     env.close()
     failed = 0.0 if replanning is None else replanning.failures / replanning.solves
-    landings = [dataclasses.replace(e, is_success=bool(e.jump["landed"])) for e in episodes]
+    landings = [dataclasses.replace(e, is_success=e.landed) for e in episodes]
     return landings, failed
 
 

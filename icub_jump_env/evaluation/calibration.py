@@ -40,7 +40,7 @@ def calibrate(family: PlanFamily) -> PlanFamily:
         for planned in family.rise:
             env = make_env(perturbed(config.replace(jump_height=float(planned))))
             episodes = [run_episode(env, seed) for seed in range(REPETITIONS)]
-            landed = all(episode.jump["landed"] for episode in episodes)
+            landed = all(episode.landed for episode in episodes)
             rises = [episode.jump["flight_height"] for episode in episodes]
             measured.append(float(np.median(rises)) if landed else np.nan)
     rise = np.array(measured)

@@ -1,5 +1,6 @@
 """What episodes say together: rates, percentiles, failures, groups by command."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -23,6 +24,21 @@ def test_wilson_interval_against_its_definition(count, total):
 
 
 class TestSummary:
+    @pytest.mark.parametrize(
+        ("jumps", "landed", "outcome", "counts"),
+        [
+            (5, 5, "stood", True),
+            (5, 4, "stood", False),
+            (5, 4, "fell", False),
+            # The second jump did not begin.
+            (1, 1, "no take-off", False),
+        ],
+    )
+    def test_a_series_has_landed_after_all_of_its_jumps(self, jumps, landed, outcome, counts):
+        series = {"jumps": jumps, "landed": landed}
+        last = dataclasses.replace(episode(0, landed=True), outcome=outcome, series=series)
+        assert Summary.of([last]).landed.count == counts
+
     def test_rates_percentiles_and_failures(self):
         heights = np.linspace(0.03, 0.05, 21)
         episodes = [episode(seed, flight_height=h) for seed, h in enumerate(heights)]

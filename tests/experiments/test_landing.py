@@ -10,7 +10,7 @@ from experiments import landing
 from experiments.landing import AIMS, SERIES, judged, render, rows
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.modes.landing_study import LandingResult, stands
+from icub_jump_env.evaluation.modes.landing_study import LandingResult
 from icub_jump_env.metrics.jump import JumpMetrics
 
 
@@ -37,14 +37,6 @@ def test_each_aim_has_its_row(controller):
 def test_no_aim_is_below_its_must():
     for must, aim in AIMS.values():
         assert (must or 0) <= aim <= 100
-
-
-@pytest.mark.parametrize(
-    ("landed", "last", "counts"), [(5, True, True), (4, False, False), (4, True, False)]
-)
-def test_all_jumps_of_a_series_must_land(landed, last, counts):
-    series = {"jumps": 5, "landed": landed}
-    assert stands(Episode(0, 0.06, "stood", last, 0.0, {"landed": last}, series=series)) is counts
 
 
 def test_what_is_printed_of_a_row():

@@ -50,6 +50,14 @@ class Episode:
     series: dict[str, Any] = field(default_factory=dict)
     trace: tuple[Snapshot, ...] = ()
 
+    @property
+    def landed(self) -> bool:
+        """Whether the robot landed and stands; of a series, after all of its jumps."""
+        if not self.series:
+            return bool(self.jump["landed"])
+        # A series that does not go on has landed every jump that began.
+        return self.outcome == "stood" and bool(self.series["landed"] == self.series["jumps"])
+
 
 def make_env(config: JumpConfig) -> ICubJumpEnv:
     """The environment of a configuration, without wrappers."""

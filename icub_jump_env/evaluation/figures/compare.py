@@ -42,7 +42,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
         names = [text.removesuffix(" cm") for text in command_labels(series).values()]
         left.set_xticks(range(len(groups)), names)
         for landed, marker in ((True, "."), (False, "x")):
-            shown = [e for e in series if e.jump["landed"] == landed]
+            shown = [e for e in series if e.landed == landed]
             if not shown:
                 continue
             (points,) = right.plot(

@@ -63,7 +63,7 @@ class LandingResult:
             case,
             {variant: Summary.of(found) for variant, found in episodes.items()},
             {
-                variant: RateDifference.of(found, episodes[HOLD], stands)
+                variant: RateDifference.of(found, episodes[HOLD], _landed)
                 for variant, found in episodes.items()
                 if variant != HOLD
             },
@@ -91,10 +91,8 @@ Results = dict[ControllerName, list[LandingResult]]
 """Results of all cases by controller."""
 
 
-def stands(episode: Episode) -> bool:
-    """Whether the robot stands in the end, after each jump of a series."""
-    in_a_row = episode.series.get("landed", 0)
-    return bool(episode.jump["landed"]) and in_a_row == episode.series.get("jumps", 0)
+def _landed(episode: Episode) -> bool:
+    return episode.landed
 
 
 def run(options: EvalOptions, _: Sequence[Contender], console: Console, progress: Console) -> None:

@@ -99,7 +99,7 @@ class Summary:
         }
         return cls(
             success=Rate(sum(e.is_success for e in episodes), len(episodes)),
-            landed=Rate(sum(bool(e.jump["landed"]) for e in episodes), len(episodes)),
+            landed=Rate(sum(e.landed for e in episodes), len(episodes)),
             mean_rise=float(values["flight_height"].mean()),
             mean_sole_height=float(np.nan_to_num(values["sole_height"]).mean()),
             mean_height_error=float(errors.mean()),
