@@ -71,27 +71,30 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Episode end
     With ``jumps`` above 1 the robot stands, crouches and jumps again, see docs/environment.md.
     Terminates on a fall (anything but the soles touches the floor, or the chest tilts
-    more than 60 deg), without take-off by T + 0.5 s, ``stand_time`` after the last
-    touch-down, or when the simulation diverges. ``info["outcome"]`` says which. The TimeLimit of
-    the registration only guards.
+    more than 60 deg), without take-off by T + 0.5 s, without the next jump 3 s after a touch-down,
+    ``stand_time`` after the last touch-down, or when the simulation diverges. ``info["outcome"]``
+    says which. The TimeLimit of the registration only guards.
 
     ## Info
     At reset, what was drawn: ``world`` (:class:`icub_jump_env.simulation.randomization.World`)
     and ``sensor_errors`` (bias and drift by kind of reading, and the force gain).
     Every step: ``jump`` (dict of :class:`icub_jump_env.metrics.jump.JumpMetrics`, final
     at the end; of several jumps the present one), ``is_success`` (of all), with several jumps
-    ``jumps`` and ``series``, ``outcome``, ``phase``, ``time``, ``diverged``, ``jump_height``, ``solver_status``, ``solver_primal_residual``,
-    ``solver_dual_residual``, ``solver_gap`` (of the step's worst control tick) and, from ``step``, the reward terms.
+    ``jumps`` and ``series``, ``outcome``, ``phase``, ``time``, ``diverged``, ``jump_height``,
+    ``solver_status``, ``solver_primal_residual``, ``solver_dual_residual``, ``solver_gap`` (of the
+    step's worst control tick) and, from ``step``, the reward terms.
 
     ## Arguments
     The fields of :class:`icub_jump_env.config.JumpConfig` and the
     :class:`icub_jump_env.shortcuts.Shortcuts` for fields inside its groups. ``reset(options=
-    {"jump_height": 0.05})`` overrides the command for one episode.
+    {"jump_height": 0.05})`` overrides the command for one episode, ``{"jump_heights": [...]}`` that
+    of each jump.
 
     ## Version history
-    v1: the same with other defaults: ``planner="whole_body"``, ``estimator="imu"``,
-    ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.config.VERSIONS`).
-    v0: first version; the paper's jump. It stays as it is, whatever Gymnasium says of newer ones.
+    * v1: the same with other defaults: ``planner="whole_body"``, ``estimator="imu"``,
+      ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.config.VERSIONS`).
+    * v0: Initial version: the paper's jump. It stays as it is, whatever Gymnasium says of newer
+      ones.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (declared so by Gymnasium)

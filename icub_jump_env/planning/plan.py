@@ -21,7 +21,7 @@ class Setpoint:
 
     Attributes:
         com_position: (3,) x_dc (m); in a plan from where the CoM is when the jump begins, for
-            the controllers in the world.
+            the controllers in the world, in flight and landing from the middle of the soles.
         com_velocity: (3,) m/s.
         com_acceleration: (3,) m/s^2.
         angular_momentum: (3,) centroidal angular momentum (kg m^2/s).

@@ -30,8 +30,8 @@ class ResidualConfig:
         scale: Largest offset of the CoM reference that an action can ask for: forward,
             lateral, vertical (m).
         phases: When the residual acts: in the launch alone, where it moves the CoM
-            reference, or in all phases; in flight and landing it moves the posture, as far
-            as it takes to shift the CoM over resting feet.
+            reference, or in all phases; in flight and landing it moves the CoM over the soles,
+            by the set point of feedback or else by the posture that does so over resting feet.
         bandwidth: Natural frequency (rad/s) of the filter that shapes it; with the default
             90 % of a step within 0.26 s.
 

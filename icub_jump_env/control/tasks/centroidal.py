@@ -1,4 +1,4 @@
-"""CoM velocity and angular momentum of a landing: (3b) and (3d) without feedback."""
+"""CoM velocity and angular momentum of a landing: (3b) and (3d) without gains of their own."""
 
 from __future__ import annotations
 
