@@ -83,7 +83,8 @@ class Catch:
 
         Args:
             state: The believed state.
-            com: (3,) where the CoM shall be, from the middle of the soles (m).
+            com: (3,) where the CoM shall be, from the middle of the soles (m): forward and left
+                of the robot, up.
             away: (n,) joint displacement that is to be taken back (rad).
         """
         mass, dt = self._kinematics.mass, self._dt
@@ -91,7 +92,7 @@ class Catch:
         cos, sin = heading(state.base_rotation)
         x, y, z = state.com.tolist()
         left_sole, right_sole = state.sole_position.tolist()
-        goal_x, goal_y, _ = com.tolist()
+        goal_ahead, goal_left, _ = com.tolist()
         vx, vy, _ = state.com_velocity.tolist()
         Hx, Hy, _ = state.angular_momentum.tolist()
         gx, gy, gz = state.gravity.tolist()
@@ -104,7 +105,6 @@ class Catch:
         # Where the CoM is above the soles along gravity, from where it shall be.
         x, y = x - z * gx / gz, y - z * gy / gz
         ahead, left = cos * x + sin * y, cos * y - sin * x
-        goal_ahead, goal_left = cos * goal_x + sin * goal_y, cos * goal_y - sin * goal_x
         falling = cos * Hy - sin * Hx - self._momentum_per_lunge * self._rate
         speed = cos * vx + sin * vy + MOMENTUM_SHARE * lever * falling
         point = ahead - goal_ahead + speed / frequency
@@ -117,13 +117,13 @@ class Catch:
         rate = self._lunge_rate(lunge, needed / shift, FARTHEST_COP / shift, lean)
         wanted = point * (1.0 + CAPTURE_GAIN / frequency) - shift * (rate - self._rate) / dt
         self._rate = rate
-        cop = goal_ahead + _within(wanted, FARTHEST_COP)
+        cop = _within(goal_ahead + wanted, FARTHEST_COP)
 
         speed = cos * vy - sin * vx - MOMENTUM_SHARE * lever * (cos * Hx + sin * Hy)
         point = left - goal_left + speed / frequency
-        wanted = _within(point * (1.0 + LATERAL_CAPTURE_GAIN / frequency), FARTHEST_LATERAL_COP)
+        wanted = goal_left + point * (1.0 + LATERAL_CAPTURE_GAIN / frequency)
         on_left, on_right = state.foot_force.tolist()
-        more = (on_left + on_right) * (goal_left + wanted) / self._half_stance
+        more = (on_left + on_right) * _within(wanted, FARTHEST_LATERAL_COP) / self._half_stance
         lift = _within(LOAD_GAIN * (more - on_left + on_right), FASTEST_LIFT)
         return Balance(cop + self._soles_from_ankles, self._momentum_per_lunge * rate, lift)
 

@@ -183,8 +183,8 @@ class FeedbackFlight:
         # The soles turn with the robot, about the vertical alone.
         cos, sin = heading(rotation)
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        self._place(state)
-        soles = self._spread.dot(turn.T) - self.setpoint.com_position
+        self._place(state, cos, sin)
+        soles = (self._spread - self.setpoint.com_position).dot(turn.T)
         legs = self._legs.step(self._posture, soles.dot(rotation), rotation.T.dot(turn))
         joints = self._legs.joints
         rate, fastest = self._rate[joints], self._fastest[joints]
@@ -218,30 +218,36 @@ class FeedbackFlight:
         self.command = JointCommand(velocity, position)
         return Tick(self.command, None)
 
-    def _place(self, state: RobotState) -> None:
-        """Set where the CoM shall be relative to the soles at touch-down."""
+    def _place(self, state: RobotState, cos: float, sin: float) -> None:
+        """Set where the CoM shall be relative to the soles at touch-down.
+
+        Args:
+            state: The believed state.
+            cos: Cosine of the robot's yaw.
+            sin: Its sine.
+        """
         height = float(self._rest[2])
         Hx, Hy, _ = state.angular_momentum.tolist()
         vx, vy, _ = state.com_velocity.tolist()
         lever, time = MOMENTUM_SHARE / (self._mass * height), math.sqrt(height / GRAVITY)
         share = min(1.0, self._dt / PLACEMENT_TIME)
-        for axis, speed in enumerate((vx + lever * Hy, vy - lever * Hx)):
+        vx, vy = vx + lever * Hy, vy - lever * Hx
+        for axis, speed in enumerate((cos * vx + sin * vy, cos * vy - sin * vx)):
             wanted = min(max(time * speed, -FARTHEST[axis]), FARTHEST[axis])
             self._placement[axis] += share * (wanted - self._placement[axis])
-        self._reach_for_ground(state, height)
+        self._reach_for_ground(state, height, abs(cos * Hy - sin * Hx))
         com = self.setpoint.com_position
         np.add(self._rest, self._residual.offset, out=com)
         com[0] -= self._placement[0]
         com[1] -= self._placement[1]
         com[2] += EXTENSION * self._reach - self._yielded
 
-    def _reach_for_ground(self, state: RobotState, height: float) -> None:
+    def _reach_for_ground(self, state: RobotState, height: float, turning: float) -> None:
         speed = float(state.com_velocity[2])
         fall = max(0.0, float(state.com[2]) - height - EXTENSION)
         impact = math.sqrt(speed * speed + 2.0 * GRAVITY * fall)
         left = (speed + impact) / GRAVITY
-        turning, placement = abs(float(state.angular_momentum[1])), abs(self._placement[0])
-        calm = turning < CALM_MOMENTUM and placement < CALM_PLACEMENT
+        calm = turning < CALM_MOMENTUM and abs(self._placement[0]) < CALM_PLACEMENT
         wait = OVERSHOOT_TIME if calm else 0.0
         if left < EXTENSION_TIME + wait + YIELD_TIME:
             self._reach = min(1.0, self._reach + self._dt / EXTENSION_TIME)
@@ -250,3 +256,5 @@ class FeedbackFlight:
             faster = self.yielding + self._dt / YIELD_TIME * fastest
             self.yielding = min(fastest, faster) if self._yielded < FARTHEST_YIELD else 0.0
             self._yielded += self._dt * self.yielding
+        else:
+            self.yielding = 0.0

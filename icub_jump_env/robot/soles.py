@@ -73,7 +73,8 @@ class LegKinematics:
             turn, position = pin.log3(orientation.dot(now.rotation.T)), now.translation
             twist[:3] = soles[foot] - position + self._com + pin.skew(position).dot(turn)
             twist[3:] = turn
-            _, steps[foot], _ = dposv(J.T.dot(J) + self._regular, J.T.dot(twist))
+            _, step, failed = dposv(J.T.dot(J) + self._regular, J.T.dot(twist))
+            steps[foot] = 0.0 if failed else step
         legs = steps.reshape(12)
         np.minimum(np.maximum(legs, -_LARGEST_STEP, out=legs), _LARGEST_STEP, out=legs)
         legs += posture[self.joints]
