@@ -112,6 +112,24 @@ def test_soles_are_placed_below_the_capture_point(velocity):
     np.testing.assert_allclose(flight.setpoint.com_position[:2], -below, atol=1e-6)
 
 
+@pytest.mark.parametrize("yaw", [-0.6, 0.3])
+def test_who_has_turned_about_the_vertical_places_the_soles_along_the_heading(yaw):
+    turn = pin.exp3(np.array([0.0, 0.0, yaw]))
+    speeds, momentum = np.array([0.2, 0.05, 0.5]), np.array([0.2, 0.3, 0.0])
+    straight, _ = fly(in_the_air(com_velocity=speeds, angular_momentum=momentum))
+    turned, command = fly(
+        in_the_air(
+            base_rotation=turn @ UPRIGHT,
+            com_velocity=turn @ speeds,
+            angular_momentum=turn @ momentum,
+        )
+    )
+    wanted = straight.setpoint.com_position
+    np.testing.assert_allclose(turned.setpoint.com_position, wanted, atol=1e-9)
+    positions, _ = soles(command, turn @ UPRIGHT)
+    np.testing.assert_allclose(positions.mean(axis=0)[:2], -(turn @ wanted)[:2], atol=2e-3)
+
+
 def test_angular_momentum_counts_like_the_speed_it_will_become():
     """A robot that pitches forward will fall forward."""
     placed = []

@@ -177,6 +177,15 @@ class TestCatch:
         on_right = WEIGHT * 0.01 / stander.state.sole_position[0, 1]
         assert balance.lift == pytest.approx(-catching.LOAD_GAIN * on_right)
 
+    @pytest.mark.parametrize("way", [-1.0, 1.0])
+    def test_the_cop_stays_within_the_soles_wherever_the_com_shall_be(self, stander, way):
+        """Even where a residual asks for a CoM over the toes, and the capture point is beyond."""
+        stander.state.com[:2] += [0.12 * way, 0.12 * way]
+        balance = stander.balance(com=[0.06 * way, 0.06 * way, 0.0])
+        assert balance.cop == pytest.approx(FROM_ANKLE + catching.FARTHEST_COP * way)
+        more = WEIGHT * catching.FARTHEST_LATERAL_COP / stander.state.sole_position[0, 1]
+        assert balance.lift == pytest.approx(catching.LOAD_GAIN * more * way)
+
     def test_the_next_landing_forgets(self, stander):
         used = Catch(stander.kinematics, DT)
         stander.state.com[0] += 0.09
