@@ -65,7 +65,7 @@ PERIOD = 0.02
 NODES = 10
 """Intervals of the horizon, which ends at take-off."""
 
-FRICTION, LEAST_LOAD, MOST_LOAD, COP_MARGIN = 0.5, 0.2, 4.0, 0.01
+FRICTION, LEAST_LOAD, MOST_LOAD, COP_MARGIN = 0.5, 0.2, 4.0, 0.005
 """Of the floor, as the controller counts on; vertical force (weights); distance of the CoP to
 heels and toes (m). The plan itself keeps further away from each."""
 

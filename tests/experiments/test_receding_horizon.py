@@ -119,7 +119,8 @@ def test_a_failed_replanning_leaves_the_plan(monkeypatch):
     env = make_env(CONFIG)
     replanning = replan(env, "position")
     assert run_episode(env, seed=0).jump == run_episode(make_env(CONFIG), seed=0).jump
-    assert replanning.failures == replanning.solves == 25
+    solves = round(planned(CONFIG).duration / receding_horizon.PERIOD)
+    assert replanning.failures == replanning.solves == solves > 20
 
 
 def test_the_table_has_a_row_of_each_source(monkeypatch, capsys):
