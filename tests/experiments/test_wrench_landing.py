@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from experiments import wrench_landing
+from experiments.wrench_controller import SolesDamped, WrenchGains, WrenchLanding
 from experiments.wrench_landing import (
     HARDEST,
     PARTS,
-    SolesDamped,
-    WrenchGains,
-    WrenchLanding,
     WrenchOptions,
     cases,
     landing_by_wrenches,
