@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from icub_jump_env import observation
+from icub_jump_env.control import catching, flight, landing
 from icub_jump_env.control.config import TorqueConfig, VelocityConfig
 from icub_jump_env.evaluation import cli
 from icub_jump_env.evaluation.options import EvalOptions
@@ -126,3 +127,23 @@ def test_the_controller_page_states_the_gains_in_use():
         assert statement in page, statement
     assert velocity.com == velocity.momentum
     assert torque.phases == phases
+
+
+def test_the_landing_page_states_the_gains_in_use():
+    page = " ".join((REPOSITORY / "docs" / "landing.md").read_text().split())
+    forward, sideways = (100 * farthest for farthest in flight.FARTHEST)
+    for statement in (
+        f"predicted by {1e3 * flight.LEAD:g} ms",
+        f"{forward:g} cm forward or back, {sideways:g} cm sideways",
+        f"legs extend by {100 * flight.EXTENSION:g} cm",
+        f"give way {1e3 * flight.YIELD_TIME:g} ms before",
+        f"up to {flight.YIELD_SHARE:g} of the speed of the fall",
+        f"wait for {1e3 * flight.OVERSHOOT_TIME:g} ms",
+        f"stop after {100 * flight.FARTHEST_YIELD:g} cm",
+        f"within {flight.SPEED_SHARE:g} of theirs",
+        f"({catching.CAPTURE_GAIN:g} 1/s; sideways {catching.LATERAL_CAPTURE_GAIN:g} 1/s)",
+        f"bounded by {100 * catching.FARTHEST_COP:g} cm",
+        f"braked within {landing.BRAKING_TIME:g} s",
+        f"landing posture in {landing.RISING_TIME:g} s",
+    ):
+        assert statement in page, statement
