@@ -13,9 +13,9 @@ from icub_jump_env.robot.kinematics import FeetFixedKinematics
 SHIFT = np.array([0.4, 0.2, -0.5], np.float32)
 
 
-def after_the_launch(action, phases, stand_time=0.4):
+def after_the_launch(action, phases, stand_time=0.4, **changes):
     """Observations and costs of an episode whose launch is the baseline's."""
-    env = make_env(JumpConfig().replace(stand_time=stand_time, residual_phases=phases))
+    env = make_env(JumpConfig().replace(stand_time=stand_time, residual_phases=phases, **changes))
     env.reset(seed=0)
     observations, costs, terminated, phase = [], [], False, "launch"
     while not terminated:
@@ -76,3 +76,14 @@ def test_in_all_phases_the_residual_ends_with_the_landing():
     steps = round(RESIDUAL_TIME / 0.01)
     assert sum(cost < 0.0 for cost in costs) == pytest.approx(steps, abs=1)
     assert set(costs[steps + 1 :]) == {0.0}
+
+
+def test_a_posture_chosen_by_feedback_and_then_held_takes_no_residual():
+    """Nothing on the ground follows it, so it costs nothing there."""
+    changes = {"estimator": "imu", "flight": "feedback"}
+    _, held = after_the_launch(SHIFT, "all", **changes)
+    _, caught = after_the_launch(SHIFT, "all", landing="feedback", **changes)
+    in_flight = sum(cost < 0.0 for cost in held)
+    assert 5 < in_flight < 30
+    assert set(held[in_flight:]) == {0.0}
+    assert sum(cost < 0.0 for cost in caught) > in_flight + 20

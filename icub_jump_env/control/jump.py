@@ -83,6 +83,8 @@ class JumpController:
             landing = FeedbackLanding(flight, self.residual, dt, kinematics, config.solver)
         else:
             landing = HoldLanding(flight)
+        # A posture that feedback chose in the air is held as it is.
+        self._none_on_the_ground = flight_name == "feedback" and landing_name == "hold"
         self._landing = landing
         self._controllers: dict[Phase, PhaseController] = {
             Phase.LAUNCH: Launch(tracking, self.reference, dt),
@@ -128,6 +130,8 @@ class JumpController:
         """Whether a residual has an effect at ``time`` (s) of the episode."""
         if not self._in_all_phases:
             return self.launching
+        if self._none_on_the_ground and self.phases.phase is Phase.LANDING:
+            return False
         return self.jump_time(time) < self.plan.duration + RESIDUAL_TIME
 
     def tick(self, state: RobotState, time: float, residual_target: Array) -> Tick:

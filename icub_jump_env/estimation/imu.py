@@ -40,6 +40,8 @@ NO_LOAD, FULL_LOAD = 0.1, 0.3
 """Shares of the weight on the feet up to which, and from which on, they are a reference."""
 AVERAGED = 100
 """Over how many readings the direction of gravity is averaged at most."""
+LIFT_OFF_READINGS = 2
+"""How many readings without load in a row are a lift-off; a single one may be noise."""
 
 
 class ImuEstimator:
@@ -78,7 +80,7 @@ class ImuEstimator:
 
     def reset(self) -> None:
         """A jump begins: the robot stands at rest on both feet, which anchor the world frame."""
-        self._readings = 0
+        self._readings = self._unloaded = 0
         self._airborne = self._has_flown = False
         self._base_velocity[:] = 0.0
         self._state.gravity[:] = 0.0, 0.0, -1.0
@@ -155,8 +157,10 @@ class ImuEstimator:
         kinematics, state = self._kinematics, self._state
         left, right = state.foot_force.tolist()
         load = self._load(left + right)
-        if load == 0.0:
+        self._unloaded = self._unloaded + 1 if load == 0.0 else 0
+        if self._unloaded >= LIFT_OFF_READINGS:
             self._airborne = self._has_flown = True
+        if load == 0.0:
             return
         if self._airborne:
             self._touch_down()

@@ -22,6 +22,9 @@ Range = tuple[float, float]
 
 RandomizationName = Literal["none", "mild", "full", "hard", "disturbed"]
 
+HIGHEST_BLOCK = 0.05
+"""Height that steps and edges may have, also one on the other (m)."""
+
 _DEG = math.radians(1.0)
 _ALLOWED: Mapping[str, Range] = MappingProxyType(
     {
@@ -45,8 +48,8 @@ _ALLOWED: Mapping[str, Range] = MappingProxyType(
         "flight_push_direction": (-math.pi, math.pi),
         "floor_tilt": (-15 * _DEG, 15 * _DEG),
         "floor_tilt_lateral": (-15 * _DEG, 15 * _DEG),
-        "step": (0.0, 0.05),
-        "edge": (-0.05, 0.05),
+        "step": (0.0, HIGHEST_BLOCK),
+        "edge": (-HIGHEST_BLOCK, HIGHEST_BLOCK),
         "landing_push": (-20.0, 20.0),
         "landing_push_time": (0.0, 5.0),
         "landing_push_direction": (-math.pi, math.pi),
@@ -111,7 +114,8 @@ class Randomization:
         takeoff_spin: Angular velocity about +y (rad/s) that the robot as a whole is given
             about its CoM at lift-off; the CoM's velocity stays.
         flight_push: Impulse on the chest in flight (N s).
-        flight_push_time: When that push begins (s after lift-off).
+        flight_push_time: When that push begins (s after lift-off); a flight lasts about 0.2 s, and
+            later it hits a robot that has landed.
         flight_push_direction: Its direction (rad).
         floor_tilt: Tilt of the floor from the apex on (rad), positive uphill in +x, about the
             point of the floor midway below the soles.
@@ -162,6 +166,10 @@ class Randomization:
             store(self, **{field.name: values})
         if any(not bound.is_integer() for bound in self.delay):
             raise ConfigError("delay", self.delay, "whole numbers of control ticks")
+        lies_at, most = self.step[1], HIGHEST_BLOCK - self.step[1]
+        if max(abs(bound) for bound in self.edge) > most:
+            expected = f"within +/- {most:g} m on a step of {lies_at:g} m"
+            raise ConfigError("edge", self.edge, expected)
 
     @property
     def varies(self) -> bool:

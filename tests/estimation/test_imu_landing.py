@@ -24,6 +24,7 @@ from motions import (
 )
 
 from icub_jump_env.env import ICubJumpEnv
+from icub_jump_env.estimation import imu
 from icub_jump_env.simulation.randomization import Randomization
 
 
@@ -53,11 +54,23 @@ class TestTouchDown:
     def test_a_contact_that_goes_on_is_no_touch_down(self):
         ours = estimator()
         feed(ours, REST, ticks(0.1))
-        feed(ours, REST, [0.0], NONE)
+        feed(ours, REST, [0.0] * imu.LIFT_OFF_READINGS, NONE)
         feed(ours, REST, [0.0])
         ours._base_position[2] += 0.01
         ours._footholds[:, 2] += 0.01
         assert feed(ours, REST, ticks(0.1)).sole_position[0, 2] == pytest.approx(0.01, abs=1e-3)
+
+    def test_a_single_reading_without_load_is_no_lift_off(self):
+        """What was 1 cm off stays so, but for the correction of loaded soles, none here."""
+        found = []
+        for unloaded in (1, 2):
+            ours = estimator()
+            feed(ours, REST, ticks(0.1))
+            ours._base_position[2] += 0.01
+            ours._footholds[:, 2] += 0.01
+            feed(ours, REST, [0.0] * unloaded, NONE)
+            found.append(feed(ours, REST, [0.0]).sole_position[0, 2])
+        assert found == pytest.approx([0.01, 0.0], abs=1e-4)
 
     def test_on_a_step_the_other_sole_stays_lower(self):
         """The floor, and with it the step, gives way by some millimetres."""

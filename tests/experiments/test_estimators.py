@@ -26,6 +26,9 @@ from experiments.estimators import (
 )  # fmt: skip
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.estimation.readings import Readings
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.robot import load_robot
 
 
 def test_errors_are_those_of_each_quantity():
@@ -70,8 +73,36 @@ def test_in_the_launch_all_are_right_and_in_the_air_the_imu(nominal):
 
 
 def test_the_accelerometer_has_a_part_in_the_velocity_alone(nominal):
-    others = nominal[:, 1:, :3]
+    others = nominal[:, 1:3, :3]
     np.testing.assert_allclose(others[:, 0], others[:, 1], rtol=1e-9)
+
+
+def test_the_direction_of_gravity_has_a_part_in_flight_from_the_air_on(nominal):
+    with_gravity, without = nominal[:, 1], nominal[:, 3]
+    launch, flight = PHASES.index("launch"), PHASES.index("flight")
+    np.testing.assert_array_equal(with_gravity[launch], without[launch])
+    assert 0.0 < abs(with_gravity[flight, 0] - without[flight, 0]) < 0.1
+
+
+def test_without_gravity_in_the_air_a_wrong_reading_does_not_turn_the_attitude():
+    """In the air the one follows a reading that is 90 degrees off, the other the gyro alone."""
+    robot = load_robot()
+    tilts = []
+    for make in (ESTIMATORS["imu"], ESTIMATORS["inertial in the air"]):
+        estimator = make(FeetFixedKinematics(robot), 0.002)
+        readings = Readings.of(robot.n_joints)
+        readings.joint_position[:] = robot.crouch
+        readings.gravity[:] = 0.0, 0.0, -1.0
+        readings.foot_force[:] = 150.0
+        start = estimator.estimate(readings).base_rotation.copy()
+        readings.gravity[:] = 1.0, 0.0, 0.0
+        readings.foot_force[:] = 0.0
+        for _ in range(50):
+            state = estimator.estimate(readings)
+        tilts.append(np.linalg.norm(pin.log3(start.T @ state.base_rotation)))
+    # The lift-off takes a second reading.
+    assert tilts[0] > 0.1
+    assert tilts[1] < 0.01
 
 
 def test_a_jump_leaves_nothing_to_the_next():
@@ -114,6 +145,7 @@ def test_conclusions_name_the_worst_case():
     assert "attitude in flight under full: 0.01 deg, within the aim of 0.3" in within[0]
     assert "CoM velocity in flight under full: 0.010 m/s, within the aim of 0.04" in within[1]
     assert "velocity 10.010 m/s instead of 0.010" in within[2]
+    assert "gravity in the air: attitude in flight 20.01 deg" in within[4]
     beyond = conclusions([found[0], *better[1:]])
     assert "attitude in flight under full: 10.00 deg, beyond" in beyond[0]
     assert "CoM velocity in flight under full: 10.000 m/s, beyond" in beyond[1]
@@ -140,7 +172,7 @@ def test_the_command_prints_and_writes(monkeypatch, capsys):
         == 2
     )
     assert (
-        len(re.findall(r"^ attitude, deg +velocity +full, ideal( +(0.20 ?){2}){5}", out, re.M))
+        len(re.findall(r"^ attitude, deg +velocity +full, ideal( +(0.20 ?){3}){5}", out, re.M))
         == 2
     )
     written = json.loads(Path("found.json").read_text())

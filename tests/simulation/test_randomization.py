@@ -105,6 +105,15 @@ class TestRanges:
             Randomization(**{field: value})
         assert refusal.value.field == field
 
+    @pytest.mark.parametrize("edge", [(0.0, 0.03), (-0.03, 0.0)])
+    def test_an_edge_on_a_step_is_no_higher_than_either_may_be(self, edge):
+        assert Randomization(step=(0.0, 0.02), edge=edge).blocks
+        with pytest.raises(
+            ConfigError, match=r"within \+/- 0.02 m on a step of 0.03 m"
+        ) as refusal:
+            Randomization(step=(0.0, 0.03), edge=edge)
+        assert refusal.value.field == "edge"
+
 
 class TestDraws:
     @given(seeds)
