@@ -9,6 +9,7 @@ from conftest import ZERO, random_action
 from gymnasium.utils.env_checker import check_env
 
 from icub_jump_env.config import VERSIONS, JumpConfig
+from icub_jump_env.simulation.randomization import Randomization
 
 V1 = JumpConfig.of(**VERSIONS["ICubJump-v1"])
 
@@ -88,3 +89,30 @@ def test_it_lands_where_a_held_posture_falls(controller, disturbance):
             *_, terminated, _, info = env.step(ZERO)
         landed.append(info["jump"]["landed"])
     assert landed == [False, True]
+
+
+@pytest.mark.parametrize("controller", ["velocity", "torque"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"sensors": "realistic", "actuators": "realistic"},
+        {"solver": "osqp"},
+        {"robot": "iCubGenova02", "planner": "scaled_curve"},
+    ],
+    ids=["realistic", "osqp", "another iCub"],
+)
+def test_feedback_lands_with_other_parts_too(controller, changes):
+    """A jump onto a step under one foot."""
+    env = gymnasium.make(
+        "ICubJump-v1",
+        controller=controller,
+        stand_time=0.8,
+        randomization=Randomization(step=(0.02, 0.02)),
+        **changes,
+    ).unwrapped
+    env.reset(seed=0)
+    terminated = False
+    while not terminated:
+        *_, terminated, _, info = env.step(ZERO)
+    assert info["outcome"] == "stood"
+    assert info["jump"]["landed"]
