@@ -3,8 +3,8 @@
     python -m experiments.estimators --episodes 30
 
 Each estimator takes in the readings of the same jumps: the paper's (``feet_fixed``), ``imu``,
-``imu`` without accelerometer, and ``imu`` without the direction of gravity in the air. The jumps are controlled as in the paper, and with feedback in
-flight and landing.
+``imu`` without accelerometer, and ``imu`` without the direction of gravity in the air. The jumps
+are controlled as in the paper, and with feedback in flight and landing.
 """
 
 from __future__ import annotations

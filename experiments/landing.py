@@ -31,7 +31,7 @@ from icub_jump_env.evaluation.modes.landing_cases import (
     landing_cases,
 )
 from icub_jump_env.evaluation.modes.landing_study import LandingResult, Results, compare
-from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, number, seeds
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, number, probability, seeds
 from icub_jump_env.evaluation.report.output import new_table, show
 
 Percent = float | None
@@ -125,7 +125,7 @@ def render(controller: ControllerName, results: Sequence[LandingResult]) -> Tabl
             ours.landed.bounds,
             f"{100 * difference.gain:+.1f}",
             "{:+.1f} to {:+.1f}".format(*(100 * bound for bound in difference.interval)),
-            _probability(difference.p_value if p is None else p),
+            probability(difference.p_value if p is None else p),
             f"{100 * force:+.0f}",
             number(ours.mean_rise, "cm"),
             number(ours.median("limit_violations"), "steps"),
@@ -138,10 +138,6 @@ def render(controller: ControllerName, results: Sequence[LandingResult]) -> Tabl
         f"highest plan: {CM * HIGHEST[controller]:g} cm; units as in eval.py --study landing"
     )
     return table
-
-
-def _probability(p: float) -> str:
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
 if __name__ == "__main__":

@@ -48,6 +48,11 @@ def spread(low: float, high: float, unit: str, signed: bool = False) -> str:
     return f"{number(low, unit, signed)} to {number(high, unit, signed)}"
 
 
+def probability(p: float) -> str:
+    """A p-value."""
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+
+
 def commands(low: float, high: float) -> str:
     """A command (m), or a range of them, in centimetres."""
     return f"{CM * low:g} cm" if low == high else f"{CM * low:g} to {CM * high:g} cm"

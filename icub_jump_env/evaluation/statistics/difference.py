@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.quantities import PERCENT, number, spread
+from icub_jump_env.evaluation.quantities import PERCENT, number, probability, spread
 from icub_jump_env.evaluation.statistics.intervals import (
     Interval,
     bootstrap_interval,
@@ -192,7 +192,8 @@ def in_words(differences: Mapping[str, Difference]) -> list[str]:
 
 
 def _shown(p_value: float) -> str:
-    return "p < 0.001" if p_value < 0.001 else f"p = {p_value:.3f}"
+    text = probability(p_value)
+    return f"p {text}" if text.startswith("<") else f"p = {text}"
 
 
 def _values(episodes: Sequence[Episode], metric: str) -> NDArray[np.float64]:
