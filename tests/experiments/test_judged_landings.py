@@ -8,6 +8,7 @@ from rich.console import Console
 
 from experiments import landing
 from experiments.landing import AIMS, SERIES, judged, render, rows
+from experiments.seeds import LANDING_TEST
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.modes.landing_study import LandingResult
@@ -68,4 +69,6 @@ def test_hold_and_feedback_jump_the_same_held_out_seeds(monkeypatch):
     jumps, cases, variants, used, jobs, resume, _ = asked["a"]
     assert jumps == CONFIGS
     assert all(SERIES in found for found in cases.values())
-    assert (variants, used, jobs, resume) == (("hold", "feedback"), range(6000, 6200), 2, True)
+    assert (variants, used, jobs, resume) == (("hold", "feedback"), LANDING_TEST, 2, True)
+    assert len(used) == 200
+    assert used.start >= 6000
