@@ -22,7 +22,7 @@ from icub_jump_env.config import VERSIONS, JumpConfig
 from icub_jump_env.control.config import CONTROLLERS, ControllerName, SolverName, TorqueConfig
 from icub_jump_env.control.phases import Tick
 from icub_jump_env.control.qp.check import check_solution
-from icub_jump_env.control.qp.solvers import make_solver
+from icub_jump_env.control.qp.solvers import CheckedSolver
 from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
@@ -84,7 +84,9 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
     samples = samples_of(name, count)
     _, s, s_dot = samples[0]
     reference = Reference(ResidualFilter(bandwidth=15.0))
-    state = estimator.estimate(Readings(s, s_dot))
+    readings = Readings.of(robot.n_joints)
+    readings.joint_position, readings.joint_velocity = s, s_dot
+    state = estimator.estimate(readings)
     stance = make_stance(kinematics, robot.crouch)
     plan = ScaledCurvePlan(plan_com_trajectory(0.04), robot, stance)
     reference.start(plan, state.com)
@@ -98,20 +100,20 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
     controller.reset(stance)
     qp = controller.qp
     problem = qp.problem
-    alone = make_solver(solver, problem)
+    alone = CheckedSolver(solver, problem)
 
     watch = Stopwatch()
     for now, s, s_dot in samples:
-        readings = Readings(s, s_dot)
+        readings.joint_position, readings.joint_velocity = s, s_dot
         watch.time("estimate", partial(estimator.estimate, readings))
         watch.time("set point", partial(reference.update, now))
         setpoint = reference.setpoint
         watch.time("tick", partial(controller.command, state, setpoint))
         if isinstance(controller, TorqueController):
             watch.time("dynamics", partial(dynamics.update, s, s_dot))
-        watch.time("pose the QP", partial(qp.pose, state, setpoint))
-        solution = watch.time("solve", alone.solve)
-        watch.time("check the solution", partial(check_solution, problem, solution))
+        watch.time("QP: pose, solve, check", partial(qp.solve, state, setpoint))
+        solution, _ = watch.time("QP: solve, check", alone.solve)
+        watch.time("QP: check", partial(check_solution, problem, solution))
 
     medians = watch.medians()
     tick = medians.pop("tick")

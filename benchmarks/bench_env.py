@@ -1,7 +1,7 @@
 """Time the environment: steps per second, and where the time goes.
 
-Runs randomised episodes on one core, as a training does, with a watch around the physics,
-Pinocchio and the QP solver.
+Runs randomised episodes on one core, as a training does, with a watch around the physics, the
+models and the QP.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/bench_env.py
 """
@@ -21,24 +21,20 @@ import numpy as np
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
-from icub_jump_env.control.qp.solvers import DAQPSolver
+from icub_jump_env.control.qp.solvers import CheckedSolver
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.rollout import make_env
-from icub_jump_env.metrics.jump import JumpRecorder
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
-from icub_jump_env.simulation.ground_truth import GroundTruth
-from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.sensors import Sensors
+from icub_jump_env.simulation.simulation import Simulation
 
 PARTS = {
-    "MuJoCo": (Physics, "step"),
-    "Pinocchio, kinematics": (FeetFixedKinematics, "update"),
-    "Pinocchio, dynamics": (FeetFixedDynamics, "update"),
-    "QP solver": (DAQPSolver, "solve"),
+    "physics, metrics": (Simulation, "run"),
+    "kinematics": (FeetFixedKinematics, "update"),
+    "dynamics": (FeetFixedDynamics, "update"),
+    "QP, solved and checked": (CheckedSolver, "solve"),
     "sensors": (Sensors, "read"),
-    "true state": (GroundTruth, "read"),
-    "metrics": (JumpRecorder, "update"),
 }
 
 

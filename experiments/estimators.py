@@ -19,7 +19,6 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
@@ -31,7 +30,7 @@ from icub_jump_env.control.config import ControllerName
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.estimation.estimator import Estimator
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
-from icub_jump_env.estimation.imu import CONTACT_GAIN, ImuEstimator
+from icub_jump_env.estimation.imu import CONTACT_GAIN, ImuEstimator, load_of, share_of
 from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.evaluation.cli import guarded, parse
@@ -44,6 +43,7 @@ from icub_jump_env.evaluation.report.output import (
     show,
     write_json,
 )
+from icub_jump_env.records import Block
 from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.mujoco_model import sole_geom
@@ -165,33 +165,41 @@ class Truth:
 class WithoutAccelerometer(ImuEstimator):
     """Believes the velocity of the feet as far as they carry load, else that the CoM falls."""
 
-    def _navigate(self, angular_velocity: Array, specific_force: Array) -> None:
-        state, kinematics, dt = self._state, self._kinematics, self._dt
-        R, before = state.base_rotation, self._base_velocity.copy()
-        R[:] = R @ pin.exp3((angular_velocity + self._base_twist[3:]) * (0.5 * dt))
-        relative = kinematics.A_base[:3, 3:] @ angular_velocity
+    def _predict(self, *blocks: Block) -> None:
+        memory, kinematics, state = self._memory, self._kinematics, self._state
+        first = memory.readings == 0.0
+        position, before = memory.base_position.copy(), memory.base_velocity.copy()
+        super()._predict(*blocks)
+        if first:
+            return
+        relative = kinematics.A_base[:3, 3:] @ memory.base_twist[3:]
         relative += kinematics.A_joints[:3] @ state.joint_velocity
-        falling = state.com_velocity + (GRAVITY * dt) * state.gravity
-        self._base_velocity[:] = falling - R @ relative / kinematics.mass
-        self._base_position += (0.5 * dt) * (before + self._base_velocity)
+        falling = state.com_velocity + (GRAVITY * memory.dt) * state.gravity
+        memory.base_velocity[:] = falling - state.base_rotation @ relative / kinematics.mass
+        memory.base_position[:] = position + memory.dt / 2 * (before + memory.base_velocity)
 
-    def _stand(self) -> None:
-        before = self._base_velocity.copy()
-        super()._stand()
-        load = self._load(float(self._state.foot_force.sum()))
+    def _stand(self, *blocks: Block) -> None:
+        memory = self._memory
+        before = memory.base_velocity.copy()
+        super()._stand(*blocks)
+        load = load_of(memory.block[0], float(self._state.foot_force.sum()), 1.0)
         if load > 0.0:
             # Nothing to wait for: the correction comes whole.
-            taken = self._share(CONTACT_GAIN * load)
-            self._base_velocity[:] = before + load / taken * (self._base_velocity - before)
+            taken = share_of(memory.block[0], CONTACT_GAIN * load)
+            memory.base_velocity[:] = before + load / taken * (memory.base_velocity - before)
 
 
 class InertialInTheAir(ImuEstimator):
     """Takes no reading of gravity in the air, where a real IMU has none either."""
 
-    def _correct_attitude(self, down: Array) -> None:
-        if self._airborne:
+    def _correct_attitude(self, *blocks: Block) -> None:
+        if self._memory.airborne:
+            kinematics, readings, *others = blocks
+            readings = readings.copy()
             down = self._state.base_rotation.T @ self._state.gravity
-        super()._correct_attitude(down)
+            readings["gravity"][0] = self._memory.base_R_imu.T @ down
+            blocks = kinematics, readings, *others
+        super()._correct_attitude(*blocks)
 
 
 ESTIMATORS: dict[str, Callable[[FeetFixedKinematics, float], Estimator]] = {

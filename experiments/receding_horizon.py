@@ -10,6 +10,7 @@ begins at the estimated velocity begins too slowly; it is also tried from the po
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import sys
 from collections.abc import Sequence
@@ -279,12 +280,7 @@ class Replanning:
         if self._tick % self._ticks_per_plan == 0 and time <= self._motion.time[-1] - PERIOD:
             self._replan(state, setpoint, time)
         self._tick += 1
-        moved = dataclasses.replace(
-            setpoint,
-            com_position=setpoint.com_position.copy(),
-            com_velocity=setpoint.com_velocity.copy(),
-            com_acceleration=setpoint.com_acceleration.copy(),
-        )
+        moved = copy.deepcopy(setpoint)
         position, velocity, acceleration = self._deviation.at(time)
         moved.com_position[_XZ] += position
         moved.com_velocity[_XZ] += velocity

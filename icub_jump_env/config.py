@@ -68,6 +68,7 @@ from icub_jump_env.simulation.sensor_models import (
 )
 
 EnvName = Literal["ICubJump-v0", "ICubJump-v1"]
+PhysicsLoop = Literal["compiled", "python"]
 VERSIONS: Mapping[EnvName, Mapping[str, Any]] = MappingProxyType(
     {
         "ICubJump-v0": {},
@@ -117,6 +118,8 @@ class JumpConfig(WithShortcuts):
         agent_frequency: Rate of ``env.step`` (Hz), a divisor of the control rate.
         timestep: Physics step (s).
         self_collision: Let the robot's links touch each other.
+        physics_loop: Whether the physics steps of a control tick are compiled, or call
+            ``mujoco.mj_step`` from Python, where it can be patched. The same bits.
         actuators: Model of servos, low-level torque control and motors: a name or an
             ``ActuatorConfig``.
         sensors: Errors of the sensors: a name or a ``SensorConfig``.
@@ -148,6 +151,7 @@ class JumpConfig(WithShortcuts):
     agent_frequency: float = 100.0
     timestep: float = 0.001
     self_collision: bool = False
+    physics_loop: PhysicsLoop = "compiled"
     actuators: ActuatorName | ActuatorConfig = "ideal"
     sensors: SensorName | SensorConfig = "ideal"
     command_delay: int = 0
@@ -163,6 +167,7 @@ class JumpConfig(WithShortcuts):
         load_robot(self.robot, self.ankle_shift)
         check_choice("com_scaling", self.com_scaling, get_args(ComScaling))
         check_choice("estimator", self.estimator, get_args(EstimatorName))
+        check_choice("physics_loop", self.physics_loop, get_args(PhysicsLoop))
         for name, names in (("flight", FlightName), ("landing", LandingName)):
             check_choice(name, getattr(self, name), get_args(names))
             if getattr(self, name) == "feedback" and self.estimator != "imu":

@@ -19,13 +19,13 @@ from icub_jump_env.estimation.estimator import Estimator
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.imu import ImuEstimator
 from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.metrics.jump import JointLimits
 from icub_jump_env.metrics.series import SeriesRecorder
 from icub_jump_env.planning.plan import JumpPlan
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot.collision import TOLERANCE
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.robot.limits import JointLimits
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.rendering import make_renderer
 from icub_jump_env.simulation.self_collision import SelfCollision
@@ -133,16 +133,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             cfg.sensor_config,
             cfg.randomization_config,
             cfg.command_delay,
+            compiled=cfg.physics_loop == "compiled",
         )
         kinematics = FeetFixedKinematics(self.robot)
         self._estimator: Estimator = FeetFixedEstimator(kinematics)
         if cfg.estimator == "imu":
             self._estimator = ImuEstimator(kinematics, cfg.control_dt)
-        robot = self.robot
-        limits = JointLimits(
-            robot.lower_position, robot.upper_position, robot.velocity_limit, robot.effort_limit
-        )
-        self._series = SeriesRecorder(cfg.jumps, limits, cfg.success)
+        self._series = SeriesRecorder(cfg.jumps, JointLimits.of(self.robot), cfg.success)
         self._recorder = self._series.present
         self._self_collision = SelfCollision(self.robot)
         self._next_look = 0.0
@@ -230,7 +227,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             action64 = np.zeros(3)  # has no effect and costs nothing
         target = action64 * self._residual_scale
         self._report = IDLE
-        already_over, before = self._outcome != "running", len(self._series.jumps)
+        already_over, before = self._outcome != "running", self._series.begun
         for _ in range(self.config.controls_per_step):
             if self._outcome == "running":
                 self._control_tick(target)
@@ -253,7 +250,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def snapshot(self) -> Snapshot:
         """True state, reference and command at the present instant, for logs and figures."""
-        truth, actuators = self._simulation.truth.read(), self._simulation.actuators
+        truth, drives = self._simulation.truth.read(), self._simulation.actuators.drives
         controller, reference = self._controller, np.full(3, np.nan)
         if controller.launching:
             reference = controller.reference.setpoint.com_position
@@ -262,9 +259,9 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             phase=controller.phases.phase.name.lower(),
             joint_position=truth.joint_position.copy(),
             joint_velocity=truth.joint_velocity.copy(),
-            joint_velocity_command=actuators.velocity_command.copy(),
+            joint_velocity_command=drives.velocity_command.copy(),
             joint_torque=truth.joint_torque.copy(),
-            joint_torque_command=actuators.torque_command.copy(),
+            joint_torque_command=drives.torque_command.copy(),
             com=truth.com.copy(),
             com_velocity=truth.com_velocity.copy(),
             com_estimate=self._state.com.copy(),
@@ -298,18 +295,12 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         tick = self._controller.tick(self._state, physics.data.time, residual_target)
         if tick.report is not None:
             self._report = worse(self._report, tick.report)
-            self._recorder.metrics.solver_failures += float(tick.report.failed)
+            if tick.report.failed:
+                self._recorder.record.solver_failures += 1.0
         simulation.command(tick.command)
-        for _ in range(self.config.physics_per_control):
-            simulation.step()
-            if physics.diverged:
-                self._outcome = "diverged"
-                return
-            truth = simulation.truth.read()
-            self._recorder.update(truth)
-            self._outcome = self._series.judge(truth, self._controller.plan.duration)
-            if self._outcome != "running":
-                break
+        self._outcome = simulation.run(self.config.physics_per_control, self._series)
+        if self._outcome == "diverged":
+            return
         self._look_for_overlap()
         following = self._controller.due(physics.data.time)
         if following is None or self._outcome != "running":
@@ -319,10 +310,11 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _begin_jump(self, plan: JumpPlan) -> None:
         """A jump begins; the robot stands at rest in its crouch."""
-        time, begun = self._simulation.physics.data.time, len(self._series.jumps)
+        time, begun = self._simulation.physics.data.time, self._series.begun
         height, *more = self._heights[begun:]
         rest = REST if more else None
-        self._series.begin(height, self._simulation.truth.state, time, rest)
+        truth = self._simulation.truth.read()
+        self._series.begin(height, plan.duration, truth, time, rest)
         self._estimator.reset()
         self._sense()
         self._start_com[:] = self._state.com
@@ -335,7 +327,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             return
         self._next_look = data.time + LOOK_PERIOD
         if self._self_collision.overlap(data.qpos) > TOLERANCE:
-            self._recorder.metrics.self_collisions += 1.0
+            self._recorder.record.self_collisions += 1.0
 
     def _sense(self) -> None:
         """From readings to the believed state, once per control tick."""

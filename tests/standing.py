@@ -51,7 +51,8 @@ class Standing:
     def be(self, s, s_dot=None):
         """Take the joint positions ``s``, still or with joint velocities."""
         s_dot = np.zeros(N) if s_dot is None else s_dot
-        self.state = self._estimator.estimate(Readings(s, s_dot))
+        readings = Readings({"n": N}, joint_position=s, joint_velocity=s_dot)
+        self.state = self._estimator.estimate(readings)
         self.setpoint.com_position[:] = self.state.com
 
     def ask(self, size=1.0, posture=0.1):

@@ -106,8 +106,8 @@ def test_success_is_judged_by_the_command_drawn(ranging):
     drawn = commands(ranging, range(10))
     for seed, success in ((np.argmin(drawn), True), (np.argmax(drawn), False)):
         ranging.reset(seed=seed)
-        metrics = ranging._recorder.metrics
-        metrics.landed, metrics.flight_time, metrics.flight_height = True, 0.2, 0.035
+        record = ranging._recorder.record
+        record.landed, record.flight_time, record.flight_height = True, 0.2, 0.035
         assert ranging._info()["is_success"] is success
 
 

@@ -77,7 +77,7 @@ class TestHardConstraints:
                 failed += 1
                 continue
             solved += 1
-            applied = subject._previous if controller == "velocity" else subject.solution
+            applied = subject._terms.previous if controller == "velocity" else subject.solution
             residual = problem.C @ applied - problem.lower[problem.n :]
             assert np.abs(residual[-equalities:]).max() <= 1e-6
         assert info["outcome"] == "stood"

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from conftest import HARD, ZERO, random_action, rollout
@@ -140,6 +141,58 @@ def test_a_copy_continues_bit_for_bit(config, steps, copier):
         terminated = results[0][2]
     assert str(results[0][4]) == str(results[1][4])
     np.testing.assert_array_equal(env.unwrapped.data.qpos, twin.unwrapped.data.qpos)
+
+
+EVENTS = {
+    "takeoff_spin": (0.2, 0.2), "flight_push": (0.5, 0.5), "landing_push": (0.5, 0.5),
+    "floor_tilt": (0.02, 0.02),
+}  # fmt: skip
+
+
+class TestLoops:
+    """The physics steps of a control tick, compiled or one by one from Python."""
+
+    @pytest.mark.parametrize(
+        "config",
+        [
+            {"stand_time": 0.1},
+            {"controller": "torque", **HARD},
+            {"jumps": 2, "stand_time": 0.1, "randomization": "full", **FEEDBACK},
+            {"randomization": EVENTS, "actuators": "realistic", "stand_time": 0.1, **FEEDBACK},
+            {"momentum_control": False},  # which falls in the middle of a tick
+        ],
+        ids=str,
+    )
+    def test_both_give_the_same_bits(self, config):
+        found = []
+        for loop in ("compiled", "python"):
+            env = gymnasium.make("ICubJump-v0", physics_loop=loop, **config)
+            *courses, info = rollout(env, random_action, seed=2)
+            data, physics = env.unwrapped.data, env.unwrapped._simulation.physics
+            found.append((*courses, data.qpos, data.qvel, data.time, physics.evaluated_time, info))
+        for ours, theirs in zip(*(bits[:-1] for bits in found), strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+        assert str(found[0][-1]) == str(found[1][-1])
+
+    def test_both_notice_a_simulation_that_diverges(self):
+        infos = []
+        for loop in ("compiled", "python"):
+            env = gymnasium.make("ICubJump-v0", physics_loop=loop)
+            env.reset(seed=0)
+            env.unwrapped.data.qvel[12] = np.nan
+            *_, terminated, _, info = env.step(ZERO)
+            assert terminated
+            infos.append(info)
+        assert infos[0]["outcome"] == infos[1]["outcome"] == "diverged"
+        assert infos[0]["time"] == infos[1]["time"]
+
+    @pytest.mark.parametrize(("loop", "seen"), [("compiled", 0), ("python", 10)])
+    def test_python_can_watch_its_own_steps_alone(self, loop, seen, monkeypatch):
+        env, steps, step = gymnasium.make("ICubJump-v0", physics_loop=loop), [], mujoco.mj_step
+        env.reset(seed=0)
+        monkeypatch.setattr(mujoco, "mj_step", lambda *given: steps.append(step(*given)))
+        env.step(ZERO)
+        assert len(steps) == seen
 
 
 class TestVariedWorlds:

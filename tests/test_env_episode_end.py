@@ -55,7 +55,8 @@ def test_fall_ends_it():
 def test_no_take_off_ends_it():
     """Motors that can just hold the crouch never leave the ground."""
     env = gymnasium.make("ICubJump-v0").unwrapped
-    env._simulation.actuators._motor._effort = np.abs(env._planner.plan(0.04).stance.torque) + 1.0
+    holding = np.abs(env._planner.plan(0.04).stance.torque) + 1.0
+    env._simulation.actuators.drives.effort[:] = holding
     *_, info = rollout(env)
     assert info["outcome"] == "no take-off"
     assert info["time"] == pytest.approx(0.43 + 0.5, abs=0.011)

@@ -142,7 +142,7 @@ def test_the_second_launch_may_fail():
         if start is None and info["series"]["jumps"] == 2:
             start = env.data.time
             holding = np.abs(env._controller.plan.stance.torque) + 1.0
-            env._simulation.actuators._motor._effort = holding
+            env._simulation.actuators.drives.effort[:] = holding
     assert info["outcome"] == "no take-off"
     assert info["time"] == pytest.approx(start + 0.43 + 0.5, abs=0.02)
     assert info["series"]["landed"] == 1

@@ -115,7 +115,7 @@ class TestPush:
         simulation, begin = env._simulation, env.data.time
         com_velocity = []
         while env.data.time < begin + 0.42:
-            simulation.step()
+            simulation.run(1, env._series)
             com_velocity.append(simulation.truth.read().com_velocity[0])
         gained = com_velocity[-1] - com_velocity[0]
         mass = env.model.body_subtreemass[0]
@@ -228,7 +228,7 @@ class TestEffects:
         simulation, data = env._simulation, env.data
         data.qvel[6:] = 3.0
         simulation.command(JointCommand(-ROBOT.velocity_limit))
-        simulation.step()
+        simulation.run(1, env._series)
         friction = FRICTION * ROBOT.effort_limit
         np.testing.assert_allclose(data.qfrc_actuator[6:], -ROBOT.effort_limit, atol=1e-9)
         np.testing.assert_allclose(data.qfrc_applied[6:], -friction, rtol=1e-6)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.compiled import compiled
+from icub_jump_env.linear_algebra import rotate
+from icub_jump_env.records import Array, Block, Number, Record
 from icub_jump_env.robot.frames import heading
 from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 CAPTURE_GAIN, LATERAL_CAPTURE_GAIN = 10.0, 4.0
 """How fast the CoP brings the capture point back, forward and sideways (1/s)."""
@@ -38,115 +36,136 @@ LOAD_GAIN, FASTEST_LIFT = 0.0002, 0.4
 """Speed of the feet relative to each other per wrong load (m/s per N), and the largest (m/s)."""
 
 
-class Balance(NamedTuple):
-    """What keeps the balance.
+class Catching(Record):
+    """What :func:`catch` knows of the robot, and what it keeps between ticks.
 
     Attributes:
-        cop: Where the CoP shall be, forward of the ankles (m).
-        pitch_momentum: Angular momentum of the lunge about the robot's left (kg m^2/s).
-        lift: Speed at which the right sole shall rise relative to the left one (m/s).
+        mass: kg.
+        dt: Control period (s).
+        soles_from_ankles: Middle of the soles, forward of the ankles (m).
+        half_stance: Half of the distance of the soles' middles (m).
+        momentum_per_lunge: See :func:`lunge_momentum` (kg m^2).
+        rate: Rate of the lunge (rad/s).
     """
 
-    cop: float
-    pitch_momentum: float
-    lift: float
+    mass: Number
+    dt: Number
+    soles_from_ankles: Number
+    half_stance: Number
+    momentum_per_lunge: Number
+    rate: Number
+
+    @classmethod
+    def of(cls, kinematics: FeetFixedKinematics, dt: float) -> Catching:
+        """That of a robot which does not lunge.
+
+        Args:
+            kinematics: The model.
+            dt: Control period (s).
+        """
+        robot = kinematics.robot
+        return cls(
+            mass=kinematics.mass,
+            dt=dt,
+            soles_from_ankles=robot.sole.center_x,
+            half_stance=kinematics.sole_positions[0, 1],
+            momentum_per_lunge=lunge_momentum(robot),
+        )
 
 
-class Catch:
-    """Brings the capture point of an inverted pendulum to rest above the soles.
+@compiled
+def catch(
+    kinematics: Block, state: Block, com: Array, away: Array, chest_up: Array, catching: Block
+) -> tuple[float, float, float]:
+    """One control tick: bring the capture point of an inverted pendulum to rest above the soles.
 
     First by the CoP; where that is not enough, by a lunge: a motion of hips, torso and arms that
     leaves the CoM where it is and has pitch momentum alone. Sideways by the loads of the feet,
     which also finds a step under one of them.
+
+    Args:
+        kinematics: The model, up to date for the state.
+        state: The believed state.
+        com: (3,) where the CoM shall be, from the middle of the soles (m): forward and left
+            of the robot, up.
+        away: (n,) joint displacement that is to be taken back (rad).
+        chest_up: (3,) the chest's up axis, base axes.
+        catching: Block of the :class:`Catching`; this changes the rate.
+
+    Returns:
+        Where the CoP shall be, forward of the ankles (m); angular momentum of the lunge about the
+        robot's left (kg m^2/s); speed at which the right sole shall rise relative to the left one
+        (m/s).
     """
+    model, s, c = kinematics[0], state[0], catching[0]
+    cos, sin = heading(s.base_rotation)
+    x = s.com[0] - (s.sole_position[0, 0] + s.sole_position[1, 0]) / 2
+    y = s.com[1] - (s.sole_position[0, 1] + s.sole_position[1, 1]) / 2
+    z = s.com[2] - (s.sole_position[0, 2] + s.sole_position[1, 2]) / 2
+    height = max(LOWEST_COM, z)
+    frequency = math.sqrt(GRAVITY / height)
+    lever = 1.0 / (c.mass * height)
+    # Where the CoM is above the soles along gravity, from where it shall be.
+    x -= z * s.gravity[0] / s.gravity[2]
+    y -= z * s.gravity[1] / s.gravity[2]
+    ahead, left = cos * x + sin * y, cos * y - sin * x
+    vx, vy = s.com_velocity[0], s.com_velocity[1]
+    Hx, Hy = s.angular_momentum[0], s.angular_momentum[1]
+    falling = cos * Hy - sin * Hx - c.momentum_per_lunge * c.rate
+    speed = cos * vx + sin * vy + MOMENTUM_SHARE * lever * falling
+    point = ahead - com[0] + speed / frequency
 
-    def __init__(self, kinematics: FeetFixedKinematics, dt: float) -> None:
-        """Set up the layer.
+    # A lunge's acceleration shifts the CoP that the CoM feels by this much.
+    shift = c.momentum_per_lunge * lever / frequency**2
+    needed = point * (1.0 + LUNGE_GAIN / frequency)
+    lunge = 0.0
+    for j in range(away.shape[0]):
+        lunge += model.centroidal_map[4, j] * away[j]
+    lunge /= c.momentum_per_lunge
+    rate = lunge_rate(
+        lunge, c.rate, needed / shift, FARTHEST_COP / shift, lean(s, chest_up, cos, sin), c.dt
+    )
+    wanted = point * (1.0 + CAPTURE_GAIN / frequency) - shift * (rate - c.rate) / c.dt
+    c.rate = rate
+    cop = within(com[0] + wanted, FARTHEST_COP) + c.soles_from_ankles
 
-        Args:
-            kinematics: The model, which the estimator keeps up to date.
-            dt: Control period (s).
-        """
-        self._kinematics, self._dt = kinematics, dt
-        robot = kinematics.robot
-        self._soles_from_ankles = robot.sole.center_x
-        self._half_stance = float(kinematics.sole_positions[0, 1])
-        self._momentum_per_lunge = lunge_momentum(robot)
-        self._rate = 0.0
+    speed = cos * vy - sin * vx - MOMENTUM_SHARE * lever * (cos * Hx + sin * Hy)
+    point = left - com[1] + speed / frequency
+    wanted = com[1] + point * (1.0 + LATERAL_CAPTURE_GAIN / frequency)
+    on_left, on_right = s.foot_force[0], s.foot_force[1]
+    more = (on_left + on_right) * within(wanted, FARTHEST_LATERAL_COP) / c.half_stance
+    lift = within(LOAD_GAIN * (more - on_left + on_right), FASTEST_LIFT)
+    return cop, c.momentum_per_lunge * rate, lift
 
-    def start(self) -> None:
-        """A touch-down: the robot does not lunge."""
-        self._rate = 0.0
 
-    def update(self, state: RobotState, com: Array, away: Array) -> Balance:
-        """One control tick.
+@compiled
+def lean(state: Block, chest_up: Array, cos: float, sin: float) -> float:
+    """Lean of the chest (rad), forward where the robot faces: its yaw by cosine and sine."""
+    up = np.empty(3)
+    rotate(state.base_rotation, chest_up, up)
+    return math.atan2(cos * up[0] + sin * up[1], up[2])
 
-        Args:
-            state: The believed state.
-            com: (3,) where the CoM shall be, from the middle of the soles (m): forward and left
-                of the robot, up.
-            away: (n,) joint displacement that is to be taken back (rad).
-        """
-        mass, dt = self._kinematics.mass, self._dt
-        # A dozen numbers: floats take a third of the time of arrays.
-        cos, sin = heading(state.base_rotation)
-        x, y, z = state.com.tolist()
-        left_sole, right_sole = state.sole_position.tolist()
-        goal_ahead, goal_left, _ = com.tolist()
-        vx, vy, _ = state.com_velocity.tolist()
-        Hx, Hy, _ = state.angular_momentum.tolist()
-        gx, gy, gz = state.gravity.tolist()
-        x -= (left_sole[0] + right_sole[0]) / 2
-        y -= (left_sole[1] + right_sole[1]) / 2
-        z -= (left_sole[2] + right_sole[2]) / 2
-        height = max(LOWEST_COM, z)
-        frequency = math.sqrt(GRAVITY / height)
-        lever = 1.0 / (mass * height)
-        # Where the CoM is above the soles along gravity, from where it shall be.
-        x, y = x - z * gx / gz, y - z * gy / gz
-        ahead, left = cos * x + sin * y, cos * y - sin * x
-        falling = cos * Hy - sin * Hx - self._momentum_per_lunge * self._rate
-        speed = cos * vx + sin * vy + MOMENTUM_SHARE * lever * falling
-        point = ahead - goal_ahead + speed / frequency
 
-        # A lunge's acceleration shifts the CoP that the CoM feels by this much.
-        shift = self._momentum_per_lunge * lever / frequency**2
-        needed = point * (1.0 + LUNGE_GAIN / frequency)
-        lunge = float(self._kinematics.J_momentum[1].dot(away)) / self._momentum_per_lunge
-        lean = self._lean(state, cos, sin)
-        rate = self._lunge_rate(lunge, needed / shift, FARTHEST_COP / shift, lean)
-        wanted = point * (1.0 + CAPTURE_GAIN / frequency) - shift * (rate - self._rate) / dt
-        self._rate = rate
-        cop = _within(goal_ahead + wanted, FARTHEST_COP)
+@compiled
+def lunge_rate(
+    lunge: float, rate: float, needed: float, borne: float, lean: float, dt: float
+) -> float:
+    """Rate of the lunge (rad/s) from now on.
 
-        speed = cos * vy - sin * vx - MOMENTUM_SHARE * lever * (cos * Hx + sin * Hy)
-        point = left - goal_left + speed / frequency
-        wanted = goal_left + point * (1.0 + LATERAL_CAPTURE_GAIN / frequency)
-        on_left, on_right = state.foot_force.tolist()
-        more = (on_left + on_right) * _within(wanted, FARTHEST_LATERAL_COP) / self._half_stance
-        lift = _within(LOAD_GAIN * (more - on_left + on_right), FASTEST_LIFT)
-        return Balance(cop + self._soles_from_ankles, self._momentum_per_lunge * rate, lift)
-
-    def _lean(self, state: RobotState, cos: float, sin: float) -> float:
-        """Lean of the chest, forward (rad)."""
-        x, y, z = state.base_rotation.dot(self._kinematics.chest_up()).tolist()
-        return math.atan2(cos * x + sin * y, z)
-
-    def _lunge_rate(self, lunge: float, needed: float, borne: float, lean: float) -> float:
-        """Rate of the lunge (rad/s) from now on.
-
-        Args:
-            lunge: How far it went (rad).
-            needed: Acceleration of the lunge that would do without a CoP (rad/s^2).
-            borne: Acceleration that the CoP bears (rad/s^2).
-            lean: Lean of the chest (rad).
-        """
-        back = -RETURN_STIFFNESS * lunge - RETURN_DAMPING * self._rate
-        wanted = min(max(_within(back, HARDEST_RETURN), needed - borne), needed + borne)
-        rate = self._rate + self._dt * _within(wanted, HARDEST_LUNGE)
-        backward = min(FARTHEST_LUNGE + lunge, (FARTHEST_LEAN + lean) / LEAN_PER_LUNGE)
-        forward = min(FARTHEST_LUNGE - lunge, (FARTHEST_LEAN - lean) / LEAN_PER_LUNGE)
-        return min(max(rate, -_stoppable(backward)), _stoppable(forward))
+    Args:
+        lunge: How far it went (rad).
+        rate: Its rate so far (rad/s).
+        needed: Acceleration of the lunge that would do without a CoP (rad/s^2).
+        borne: Acceleration that the CoP bears (rad/s^2).
+        lean: Lean of the chest (rad).
+        dt: Control period (s).
+    """
+    back = within(-RETURN_STIFFNESS * lunge - RETURN_DAMPING * rate, HARDEST_RETURN)
+    wanted = min(max(back, needed - borne), needed + borne)
+    rate += dt * within(wanted, HARDEST_LUNGE)
+    backward = min(FARTHEST_LUNGE + lunge, (FARTHEST_LEAN + lean) / LEAN_PER_LUNGE)
+    forward = min(FARTHEST_LUNGE - lunge, (FARTHEST_LEAN - lean) / LEAN_PER_LUNGE)
+    return min(max(rate, -stoppable(backward)), stoppable(forward))
 
 
 def lunge_momentum(robot: Robot) -> float:
@@ -163,10 +182,13 @@ def lunge_momentum(robot: Robot) -> float:
     return 1.0 / float(np.abs(per_momentum[: robot.arms.start]).max())
 
 
-def _stoppable(way: float) -> float:
+@compiled
+def stoppable(way: float) -> float:
     """Speed of a lunge (rad/s) that can be stopped within ``way`` (rad)."""
     return min(FASTEST_LUNGE, math.sqrt(2.0 * STOPPING_LUNGE * max(0.0, way)))
 
 
-def _within(value: float, bound: float) -> float:
+@compiled
+def within(value: float, bound: float) -> float:
+    """The value, but for what is beyond plus or minus the bound."""
     return min(max(value, -bound), bound)

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
-import pinocchio as pin
-from numpy.typing import NDArray
 
+from icub_jump_env.compiled import compiled
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.phases import PhaseController, Tick
 from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.linear_algebra import multiply, rotate, rotate_back, rotation_of
 from icub_jump_env.planning.minimum_jerk import MinimumJerk, progress
 from icub_jump_env.planning.plan import JumpPlan, Setpoint
 from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.records import Array, Block, Number, PerJoint, Record, Rotation, Vector
 from icub_jump_env.robot.frames import heading
 from icub_jump_env.robot.icub import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.soles import LegKinematics
-
-Array = NDArray[np.float64]
 
 LEAD = 0.02
 """How far ahead the attitude is predicted (s)."""
@@ -53,11 +52,14 @@ class Flight(PhaseController, Protocol):
 
     Attributes:
         command: The latest command.
-        yielding: Speed at which the legs give way (m/s).
     """
 
     command: JointCommand
-    yielding: float
+
+    @property
+    def yielding(self) -> float:
+        """Speed at which the legs give way (m/s)."""
+        ...
 
     def go_on(self, time: float, residual_target: Array) -> Tick:
         """After touch-down: the motion goes on to its end, without feedback."""
@@ -121,6 +123,54 @@ class MinimumJerkFlight:
         self._motion, self._began = MinimumJerk(now, posture, duration), time
 
 
+class Aim(Record):
+    """Where feedback wants the soles, and what it keeps between ticks.
+
+    Attributes:
+        dt: Control period (s).
+        mass: kg.
+        inverse_inertia: (3, 3) of the robot as one rigid body, base axes (1/(kg m^2)).
+        rest: (3,) CoM from the middle of the soles in the landing posture (m).
+        spread: (2, 3) soles from their middle in the landing posture (m).
+        placement: (2,) soles ahead of the CoM, forward and left (m).
+        reach: How far the legs reach for the ground, from 0 to 1.
+        yielded, yielding: How far the legs gave way (m), and how fast they do (m/s).
+        soles: (2, 3) wanted middles of the soles from the CoM, base axes (m).
+        orientation: (3, 3) wanted orientation of both soles in the base.
+    """
+
+    dt: Number
+    mass: Number
+    inverse_inertia: Rotation
+    rest: Vector
+    spread: Annotated[Array, (2, 3)]
+    placement: Annotated[Array, (2,)]
+    reach: Number
+    yielded: Number
+    yielding: Number
+    soles: Annotated[Array, (2, 3)]
+    orientation: Rotation
+
+
+class Motion(Record):
+    """A motion of the joints that begins at rest, to a posture that may move.
+
+    Attributes:
+        fastest: (n,) largest speeds of corrections and commands (rad/s).
+        lower, upper: (n,) position limits (rad).
+        start: (n,) where it began (rad).
+        posture: (n,) where it goes (rad).
+        rate: (n,) speed of the posture (rad/s).
+    """
+
+    fastest: PerJoint
+    lower: PerJoint
+    upper: PerJoint
+    start: PerJoint
+    posture: PerJoint
+    rate: PerJoint
+
+
 class FeedbackFlight:
     """The same, to a landing posture whose legs follow what the robot does in the air.
 
@@ -130,7 +180,6 @@ class FeedbackFlight:
     Attributes:
         setpoint: Its CoM position is relative to the middle of the soles (m).
         command: The latest command.
-        yielding: Speed at which the legs give way (m/s).
     """
 
     def __init__(
@@ -143,118 +192,177 @@ class FeedbackFlight:
             dt: Control period (s).
             kinematics: The model.
         """
-        self._residual, self._dt, self._mass = residual, dt, kinematics.mass
-        self._robot = robot = kinematics.robot
+        robot = kinematics.robot
+        self._residual, self._dt = residual, dt
         self._stance = FeetFixedKinematics(robot)
         self._legs = LegKinematics(robot)
-        self._fastest = SPEED_SHARE * robot.velocity_limit
+        self._aim = Aim(dt=dt, mass=kinematics.mass)
+        self._motion = Motion(
+            {"n": robot.n_joints},
+            fastest=SPEED_SHARE * robot.velocity_limit,
+            lower=robot.lower_position,
+            upper=robot.upper_position,
+        )
         self.setpoint = Setpoint.at_rest(robot.landing)
         self.command = JointCommand()
-        n = robot.n_joints
-        self._start, self._posture, self._rate = np.zeros(n), np.zeros(n), np.zeros(n)
         self._began = self._duration = 0.0
-        self._inverse_inertia = np.eye(3)
-        self._rest = np.zeros(3)
-        self._spread = np.zeros((2, 3))
-        self._placement = [0.0, 0.0]
-        self._reach = self._yielded = self.yielding = 0.0
+
+    @property
+    def yielding(self) -> float:
+        """Speed at which the legs give way (m/s)."""
+        return self._aim.yielding
 
     def start(self, state: RobotState, plan: JumpPlan, time: float) -> None:
         """Begin in ``state``, ``time`` (s) after the start of the jump."""
         self._began, self._duration = time, plan.retraction_time
-        self._start[:] = state.joint_position
-        self._rate[:] = 0.0
-        self._posture[:] = plan.landing_posture
+        motion, aim = self._motion, self._aim
+        motion.start[:] = state.joint_position
+        motion.rate[:] = 0.0
+        motion.posture[:] = plan.landing_posture
         self._stance.update(plan.landing_posture)
-        self._inverse_inertia = np.linalg.inv(self._stance.A_base[3:, 3:])
+        aim.inverse_inertia[:] = np.linalg.inv(self._stance.A_base[3:, 3:])
         soles = self._stance.sole_positions
-        self._rest[:] = self._stance.com - soles.mean(axis=0)
-        self._spread[:] = soles - soles.mean(axis=0)
-        self._placement = [0.0, 0.0]
-        self._reach = self._yielded = self.yielding = 0.0
+        aim.rest[:] = self._stance.com - soles.mean(axis=0)
+        aim.spread[:] = soles - soles.mean(axis=0)
+        aim.placement[:] = aim.reach = aim.yielded = aim.yielding = 0.0
         self._residual.reset()
 
     def tick(self, state: RobotState, time: float, residual_target: Array) -> Tick:
         """One control tick, as :class:`icub_jump_env.control.phases.PhaseController`."""
         self._residual.step(residual_target, self._dt)
-        # As one rigid body: what the legs do to the base comes back as an echo.
-        spin = self._inverse_inertia.dot(state.angular_momentum.dot(state.base_rotation))
-        rotation = state.base_rotation.dot(pin.exp3(LEAD * spin))
-        # The soles turn with the robot, about the vertical alone.
-        cos, sin = heading(rotation)
-        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        self._place(state, cos, sin)
-        soles = (self._spread - self.setpoint.com_position).dot(turn.T)
-        legs = self._legs.step(self._posture, soles.dot(rotation), rotation.T.dot(turn))
-        joints = self._legs.joints
-        rate, fastest = self._rate[joints], self._fastest[joints]
-        np.subtract(legs, self._posture[joints], out=rate)
-        rate /= self._dt
-        np.minimum(np.maximum(rate, -fastest, out=rate), fastest, out=rate)
-        self._posture += self._dt * self._rate
+        aim, motion = self._aim, self._motion
+        take_aim(state.block, self._residual.offset, self.setpoint.block, aim.block)
+        legs = self._legs.step(motion.posture, aim.soles, aim.orientation)
+        move_posture(legs, self._dt, motion.block)
         return self._command(time)
 
     def go_on(self, time: float, residual_target: Array) -> Tick:
         """The motion goes on to its end, where it stays."""
-        self._rate[:] = 0.0
+        self._motion.rate[:] = 0.0
         return self._command(time)
 
     def move_to(self, posture: Array, time: float, duration: float) -> None:
         """The next motion begins with the latest command."""
         if self.command.position is not None:
-            self._start[:] = self.command.position
-        self._posture[:] = posture
+            self._motion.start[:] = self.command.position
+        self._motion.posture[:] = posture
         self._began, self._duration = time, duration
 
     def _command(self, time: float) -> Tick:
-        done, rate = progress(min((time - self._began) / self._duration, 1.0))
-        way = self._posture - self._start
-        velocity = rate / self._duration * way + done * self._rate
-        fastest, robot = self._fastest, self._robot
-        np.minimum(np.maximum(velocity, -fastest, out=velocity), fastest, out=velocity)
-        position = self._start + done * way + LAG * velocity
-        np.maximum(position, robot.lower_position, out=position)
-        np.minimum(position, robot.upper_position, out=position)
+        velocity, position = np.empty((2, len(self._motion.start)))
+        move(time - self._began, self._duration, self._motion.block, velocity, position)
         self.command = JointCommand(velocity, position)
         return Tick(self.command, None)
 
-    def _place(self, state: RobotState, cos: float, sin: float) -> None:
-        """Set where the CoM shall be relative to the soles at touch-down.
 
-        Args:
-            state: The believed state.
-            cos: Cosine of the robot's yaw.
-            sin: Its sine.
-        """
-        height = float(self._rest[2])
-        Hx, Hy, _ = state.angular_momentum.tolist()
-        vx, vy, _ = state.com_velocity.tolist()
-        lever, time = MOMENTUM_SHARE / (self._mass * height), math.sqrt(height / GRAVITY)
-        share = min(1.0, self._dt / PLACEMENT_TIME)
-        vx, vy = vx + lever * Hy, vy - lever * Hx
-        for axis, speed in enumerate((cos * vx + sin * vy, cos * vy - sin * vx)):
-            wanted = min(max(time * speed, -FARTHEST[axis]), FARTHEST[axis])
-            self._placement[axis] += share * (wanted - self._placement[axis])
-        self._reach_for_ground(state, height, abs(cos * Hy - sin * Hx))
-        com = self.setpoint.com_position
-        np.add(self._rest, self._residual.offset, out=com)
-        com[0] -= self._placement[0]
-        com[1] -= self._placement[1]
-        com[2] += EXTENSION * self._reach - self._yielded
+@compiled
+def take_aim(state: Block, residual: Array, setpoint: Block, aim: Block) -> None:
+    """Where the soles shall be at touch-down.
 
-    def _reach_for_ground(self, state: RobotState, height: float, turning: float) -> None:
-        speed = float(state.com_velocity[2])
-        fall = max(0.0, float(state.com[2]) - height - EXTENSION)
-        impact = math.sqrt(speed * speed + 2.0 * GRAVITY * fall)
-        left = (speed + impact) / GRAVITY
-        calm = turning < CALM_MOMENTUM and abs(self._placement[0]) < CALM_PLACEMENT
-        wait = OVERSHOOT_TIME if calm else 0.0
-        if left < EXTENSION_TIME + wait + YIELD_TIME:
-            self._reach = min(1.0, self._reach + self._dt / EXTENSION_TIME)
-        if left < YIELD_TIME and self._placement[0] > -FARTHEST_BACK:
-            fastest = YIELD_SHARE * impact
-            faster = self.yielding + self._dt / YIELD_TIME * fastest
-            self.yielding = min(fastest, faster) if self._yielded < FARTHEST_YIELD else 0.0
-            self._yielded += self._dt * self.yielding
-        else:
-            self.yielding = 0.0
+    Args:
+        state: The believed state.
+        residual: (3,) what the residual adds to the CoM's place over the soles (m).
+        setpoint: What says so; this sets the position of its CoM.
+        aim: Block of the :class:`Aim`.
+    """
+    s, a, com = state[0], aim[0], setpoint[0].com_position
+    # As one rigid body: what the legs do to the base comes back as an echo.
+    momentum, ahead = np.empty(3), np.empty(3)
+    rotate_back(s.base_rotation, s.angular_momentum, momentum)
+    rotate(a.inverse_inertia, momentum, ahead)
+    for i in range(3):
+        ahead[i] *= LEAD
+    turned, rotation = np.empty((3, 3)), np.empty((3, 3))
+    rotation_of(ahead, turned)
+    multiply(s.base_rotation, turned, rotation)
+    # The soles turn with the robot, about the vertical alone.
+    cos, sin = heading(rotation)
+    turn = np.zeros((3, 3))
+    turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1], turn[2, 2] = cos, -sin, sin, cos, 1.0
+
+    place(s, cos, sin, a)
+    reach_for_ground(s, abs(cos * s.angular_momentum[1] - sin * s.angular_momentum[0]), a)
+    for i in range(3):
+        com[i] = a.rest[i] + residual[i]
+    com[0] -= a.placement[0]
+    com[1] -= a.placement[1]
+    com[2] += EXTENSION * a.reach - a.yielded
+
+    from_com, world = np.empty(3), np.empty(3)
+    for foot in range(2):
+        for i in range(3):
+            from_com[i] = a.spread[foot, i] - com[i]
+        rotate(turn, from_com, world)
+        rotate_back(rotation, world, a.soles[foot])
+    multiply(rotation.T, turn, a.orientation)
+
+
+@compiled
+def place(state: Block, cos: float, sin: float, aim: Block) -> None:
+    """Move the soles to where the CoM will come to rest; the yaw by cosine and sine."""
+    height = aim.rest[2]
+    lever, time = MOMENTUM_SHARE / (aim.mass * height), math.sqrt(height / GRAVITY)
+    vx = state.com_velocity[0] + lever * state.angular_momentum[1]
+    vy = state.com_velocity[1] - lever * state.angular_momentum[0]
+    share = min(1.0, aim.dt / PLACEMENT_TIME)
+    for axis in range(2):
+        speed = cos * vx + sin * vy if axis == 0 else cos * vy - sin * vx
+        wanted = min(max(time * speed, -FARTHEST[axis]), FARTHEST[axis])
+        aim.placement[axis] += share * (wanted - aim.placement[axis])
+
+
+@compiled
+def reach_for_ground(state: Block, turning: float, aim: Block) -> None:
+    """Extend the legs by the predicted time to touch-down, then let them give way.
+
+    Args:
+        state: The believed state.
+        turning: Size of the pitch momentum (kg m^2/s).
+        aim: The aim.
+    """
+    speed = state.com_velocity[2]
+    fall = max(0.0, state.com[2] - aim.rest[2] - EXTENSION)
+    impact = math.sqrt(speed * speed + 2.0 * GRAVITY * fall)
+    left = (speed + impact) / GRAVITY
+    calm = turning < CALM_MOMENTUM and abs(aim.placement[0]) < CALM_PLACEMENT
+    wait = OVERSHOOT_TIME if calm else 0.0
+    if left < EXTENSION_TIME + wait + YIELD_TIME:
+        aim.reach = min(1.0, aim.reach + aim.dt / EXTENSION_TIME)
+    if left < YIELD_TIME and aim.placement[0] > -FARTHEST_BACK:
+        fastest = YIELD_SHARE * impact
+        faster = aim.yielding + aim.dt / YIELD_TIME * fastest
+        aim.yielding = min(fastest, faster) if aim.yielded < FARTHEST_YIELD else 0.0
+        aim.yielded += aim.dt * aim.yielding
+    else:
+        aim.yielding = 0.0
+
+
+@compiled
+def move_posture(legs: Array, dt: float, motion: Block) -> None:
+    """Move the posture's legs, which come first, to (12,) positions (rad) as fast as they may."""
+    m = motion[0]
+    for j in range(legs.shape[0]):
+        rate = (legs[j] - m.posture[j]) / dt
+        m.rate[j] = min(max(rate, -m.fastest[j]), m.fastest[j])
+        m.posture[j] += dt * m.rate[j]
+
+
+@compiled
+def move(since: float, duration: float, motion: Block, velocity: Array, position: Array) -> None:
+    """Command the motion, minimum jerk with a goal that moves.
+
+    Args:
+        since: Time since it began (s).
+        duration: Time to the posture (s).
+        motion: Block of the :class:`Motion`.
+        velocity: (n,) commanded velocities (rad/s), which this writes.
+        position: (n,) commanded positions (rad), likewise.
+    """
+    m = motion[0]
+    done, rate = progress(min(since / duration, 1.0))
+    for j in range(velocity.shape[0]):
+        way = m.posture[j] - m.start[j]
+        speed = rate / duration * way + done * m.rate[j]
+        velocity[j] = min(max(speed, -m.fastest[j]), m.fastest[j])
+        reached = m.start[j] + done * way + LAG * velocity[j]
+        position[j] = min(max(reached, m.lower[j]), m.upper[j])

@@ -7,24 +7,20 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.catching import Catch
+from icub_jump_env.compiled import compiled
+from icub_jump_env.control.catching import Catching, catch
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.config import SolverName
 from icub_jump_env.control.flight import Flight
 from icub_jump_env.control.phases import PhaseController, Tick
-from icub_jump_env.control.tasks.centroidal import CentroidalVelocity
-from icub_jump_env.control.tasks.feet import SolesApart
-from icub_jump_env.control.tasks.limits import VelocityLimits
-from icub_jump_env.control.tasks.posture import PostureVelocity
-from icub_jump_env.control.tasks.smoothness import VelocitySmoothness
-from icub_jump_env.control.tasks.stack import TaskQP
+from icub_jump_env.control.velocity import VelocityQP, VelocityTerms
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.planning.minimum_jerk import MinimumJerk, progress
 from icub_jump_env.planning.plan import JumpPlan, Setpoint
 from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.records import Array, Block
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
-
-Array = NDArray[np.float64]
+from icub_jump_env.robot.limits import JointLimits
 
 COM_WEIGHT, MOMENTUM_WEIGHT = 3e3, 100.0
 """Weights of CoM ((m/s)^-2) and angular momentum ((kg m^2/s)^-2) against the posture."""
@@ -82,7 +78,7 @@ class HoldLanding:
 class FeedbackLanding:
     """The legs give way, the ankles balance, and the body lunges if that is not enough.
 
-    Three layers on an inverted pendulum. :class:`icub_jump_env.control.catching.Catch` decides
+    Three layers on an inverted pendulum. :func:`icub_jump_env.control.catching.catch` decides
     CoP, lunge and load of the feet from the capture point. The ankles are torque-controlled and
     put the CoP where it says; soles follow the ground, whatever its slope. All other joints are
     position-controlled and follow a velocity QP like eq. 3, whose tasks are height of the CoM,
@@ -116,32 +112,26 @@ class FeedbackLanding:
             [robot.joint_names.index(f"{side}_ankle_{axis}") for side in "lr"]
             for axis in ("pitch", "roll")
         )
-        self._ankle_pitch, self._ankles = pitch, np.array(pitch + roll)
+        self._ankle_pitch, self._ankles = np.array(pitch), np.array(pitch + roll)
         # NaN leaves a joint to its servo.
         self._damping = np.full(n, np.nan)
         self._damping[self._ankles] = ANKLE_DAMPING
-        self._catch = Catch(kinematics, dt)
-        self._soles_apart = SolesApart(kinematics)
-        self._velocity = np.zeros(n)
-        centroidal = CentroidalVelocity(kinematics, COM_WEIGHT, MOMENTUM_WEIGHT)
-        self._qp = TaskQP(
-            n + centroidal.size,
-            costs=[
-                PostureVelocity(POSTURE_GAIN, robot.per_joint("posture", POSTURE_WEIGHT)),
-                VelocitySmoothness(
-                    robot.per_joint("smoothness", SMOOTHNESS_WEIGHT), self._velocity
-                ),
-                centroidal,
-            ],
-            soft=[],
-            hard=[centroidal, self._soles_apart],
-            limits=[VelocityLimits(robot, LIMIT_HORIZON, SPEED_SHARE)],
-            solver=solver,
+        self._catching = Catching.of(kinematics, dt)
+        self._terms = VelocityTerms(
+            {"n": n},
+            com_weight=COM_WEIGHT,
+            momentum_weight=MOMENTUM_WEIGHT,
+            posture=POSTURE_GAIN,
+            posture_weight=robot.per_joint("posture", POSTURE_WEIGHT),
+            smoothness_weight=robot.per_joint("smoothness", SMOOTHNESS_WEIGHT),
+            horizon=LIMIT_HORIZON,
+            margin=SPEED_SHARE,
+            dt=dt,
         )
+        self._qp = VelocityQP(self._terms, kinematics, solver)
         self.setpoint = Setpoint.at_rest(robot.landing)
         self._position = np.zeros(n)
-        self._lower = robot.lower_position + LIMIT_MARGIN
-        self._upper = robot.upper_position - LIMIT_MARGIN
+        self._limits = JointLimits.of(robot)
         self._stand = np.zeros(n)
         self._stand_height = 0.0
         # Posture (rad), then height and forward place of the CoM (m); none before a crouch.
@@ -157,10 +147,10 @@ class FeedbackLanding:
         stance = FeetFixedKinematics(self._robot)
         stance.update(self._stand)
         self._stand_height = float(stance.com[2])
-        self._catch.start()
+        self._catching.rate = 0.0
         command = self._flight.command
         self._position[:] = state.joint_position if command.position is None else command.position
-        self._velocity[:] = 0.0
+        self._terms.previous[:] = 0.0
         self._touch_height = float(self._kinematics.com[2])
         self._sinking = self._flight.yielding
         self._depth = max(
@@ -171,7 +161,7 @@ class FeedbackLanding:
     def tick(self, state: RobotState, time: float, residual_target: Array) -> Tick:
         """One control tick, as :class:`icub_jump_env.control.phases.PhaseController`."""
         kinematics, setpoint, dt = self._kinematics, self.setpoint, self._dt
-        s, s_dot = state.joint_position, state.joint_velocity
+        s = state.joint_position
         self._residual.step(residual_target, dt)
         x, y, z = self._residual.offset.tolist()
         forward, height, rise = self._stand_at(time)
@@ -181,28 +171,25 @@ class FeedbackLanding:
         com[0], com[1], com[2] = forward + x, y, height + z
         lag = height + z - float(kinematics.com[2])
         setpoint.com_velocity[2] = rise + self._residual.velocity[2] + HEIGHT_GAIN * lag
-        balance = self._catch.update(state, com, self._position - setpoint.posture)
-        setpoint.angular_momentum[1] = balance.pitch_momentum
-        self._soles_apart.speed = balance.lift
+        away = self._position - setpoint.posture
+        cop, setpoint.angular_momentum[1], self._terms.lift = self._catch(state, com, away)
         solution, report = self._qp.solve(state, setpoint)
+        velocity = self._terms.previous
         if report.failed:
-            self._velocity *= 0.8
+            velocity *= 0.8
         else:
-            self._velocity[:] = solution.x[: len(self._velocity)]
-        position, step = self._position, s - self._position
-        np.minimum(np.maximum(step, -LARGEST_LAG, out=step), LARGEST_LAG, out=step)
-        step *= REFERENCE_LEAK
-        step += self._velocity
-        step *= dt
-        position += step
-        np.minimum(np.maximum(position, self._lower, out=position), self._upper, out=position)
-
-        torque = self._damping * (self._velocity - s_dot)
-        (left, right), (on_left, on_right) = self._ankle_pitch, state.foot_force.tolist()
-        torque[left] += max(on_left, 0.0) * balance.cop
-        torque[right] += max(on_right, 0.0) * balance.cop
-        command = JointCommand(self._velocity.copy(), self._position.copy(), torque)
+            velocity[:] = solution.x
+        torque = self._damping.copy()
+        follow(state.block, velocity, self._limits.block, dt, self._position, torque)
+        load(state.block, self._ankle_pitch, cop, torque)
+        command = JointCommand(velocity.copy(), self._position.copy(), torque)
         return Tick(command, report)
+
+    def _catch(self, state: RobotState, com: Array, away: Array) -> tuple[float, float, float]:
+        """CoP, momentum and lift of :func:`icub_jump_env.control.catching.catch`."""
+        kinematics = self._kinematics
+        up = kinematics.chest_up()
+        return catch(kinematics.block, state.block, com, away, up, self._catching.block)
 
     def crouch(self, plan: JumpPlan, time: float) -> None:
         """The balance goes on while the stand becomes the crouch, as :class:`Landing`."""
@@ -235,3 +222,41 @@ class FeedbackLanding:
         done, rate = progress(min(max((since - braking - RISING_DELAY) / RISING_TIME, 0.0), 1.0))
         way = self._stand_height - lowest
         return lowest + done * way, rate / RISING_TIME * way
+
+
+@compiled
+def follow(
+    state: Block, velocity: Array, limits: Block, dt: float, position: Array, torque: Array
+) -> None:
+    """Move commanded positions at the velocities that the QP decided.
+
+    Args:
+        state: The believed state.
+        velocity: (n,) rad/s.
+        limits: Of the joints.
+        dt: Control period (s).
+        position: (n,) commanded positions (rad), which this moves.
+        torque: (n,) torque per speed that the QP did not ask for (Nm s/rad); this makes it the
+            torque (Nm).
+    """
+    s, bounds = state[0], limits[0]
+    for j in range(position.shape[0]):
+        lag = min(max(s.joint_position[j] - position[j], -LARGEST_LAG), LARGEST_LAG)
+        moved = position[j] + dt * (velocity[j] + REFERENCE_LEAK * lag)
+        lowest, highest = bounds.lower[j] + LIMIT_MARGIN, bounds.upper[j] - LIMIT_MARGIN
+        position[j] = min(max(moved, lowest), highest)
+        torque[j] *= velocity[j] - s.joint_velocity[j]
+
+
+@compiled
+def load(state: Block, ankle_pitch: NDArray[np.int64], cop: float, torque: Array) -> None:
+    """Add what puts the CoP of each foot ``cop`` (m) ahead of its ankle: its load times that.
+
+    Args:
+        state: The believed state.
+        ankle_pitch: (2,) which joints pitch the left and the right foot.
+        cop: m.
+        torque: (n,) Nm.
+    """
+    for foot in range(2):
+        torque[ankle_pitch[foot]] += max(state[0].foot_force[foot], 0.0) * cop

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from icub_jump_env.compiled import compiled
 from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.linear_algebra import rotate
+from icub_jump_env.records import Array, Block
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 
@@ -24,24 +27,11 @@ class FeetFixedEstimator:
             kinematics: The model that :meth:`estimate` keeps up to date.
         """
         self._kinematics = kinematics
-        self._rates = np.zeros(6)
-        n = kinematics.robot.n_joints
         self._state = RobotState(
-            joint_position=np.zeros(n),
-            joint_velocity=np.zeros(n),
-            base_rotation=kinematics.base_rotation,
-            angular_velocity=np.zeros(3),
-            com=kinematics.com,
-            com_velocity=self._rates[:3],
-            angular_momentum=self._rates[3:],
-            foot_force=np.zeros(2),
+            {"n": kinematics.robot.n_joints},
             sole_position=kinematics.sole_positions,
-            gravity=np.array([0.0, 0.0, -1.0]),
+            gravity=(0.0, 0.0, -1.0),
         )
-
-    def __reduce__(self) -> tuple[type[FeetFixedEstimator], tuple[FeetFixedKinematics]]:
-        # The state is made of views, which the next estimate fills.
-        return FeetFixedEstimator, (self._kinematics,)
 
     def reset(self) -> None:
         """Each tick stands for itself."""
@@ -54,10 +44,35 @@ class FeetFixedEstimator:
         """The believed state; the next call overwrites it."""
         kinematics, state = self._kinematics, self._state
         kinematics.update(readings.joint_position)
-        np.dot(kinematics.centroidal_map, readings.joint_velocity, out=self._rates)
-        base_twist = kinematics.J_left.dot(readings.joint_velocity[kinematics.robot.left_leg])
-        np.dot(kinematics.base_rotation, -base_twist[3:], out=state.angular_velocity)
-        state.joint_position = readings.joint_position
-        state.joint_velocity = readings.joint_velocity
-        state.foot_force = readings.foot_force
+        believe_feet(kinematics.block, kinematics.J_left, readings.block, state.block)
         return state
+
+
+@compiled
+def believe_feet(kinematics: Block, J_left: Array, readings: Block, state: Block) -> None:
+    """The state if both feet stand still.
+
+    Args:
+        kinematics: The model, up to date.
+        J_left: (6, 6) twist of the left foot of the left leg's joints, base axes.
+        readings: Of the encoders and the force sensors.
+        state: What this fills, but for soles and gravity, which stay.
+    """
+    k, told, s = kinematics[0], readings[0], state[0]
+    s.joint_position[:] = told.joint_position
+    s.joint_velocity[:] = told.joint_velocity
+    s.foot_force[:] = told.foot_force
+    s.base_rotation[:] = k.base_rotation
+    s.com[:] = k.com
+    rate = s.joint_velocity
+    s.com_velocity[:] = 0.0
+    s.angular_momentum[:] = 0.0
+    for i in range(3):
+        for j in range(rate.shape[0]):
+            s.com_velocity[i] += k.centroidal_map[i, j] * rate[j]
+            s.angular_momentum[i] += k.centroidal_map[3 + i, j] * rate[j]
+    turning = np.zeros(3)
+    for i in range(3):
+        for j in range(6):
+            turning[i] -= J_left[3 + i, j] * rate[j]
+    rotate(k.base_rotation, turning, s.angular_velocity)

@@ -14,17 +14,25 @@ the encoders moves the soles from where they are level with that floor.
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from icub_jump_env.compiled import compiled
 from icub_jump_env.estimation.readings import Readings
 from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.linear_algebra import (
+    add_cross,
+    multiply,
+    rotate,
+    rotate_back,
+    rotation_of,
+    turn_of,
+)
+from icub_jump_env.records import Array, Block, Number, Record, Rotation, Vector
 from icub_jump_env.robot.icub import BASE_YAW, GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
-
-Array = NDArray[np.float64]
 
 CONTACT_GAIN = 40.0
 """How fast loaded soles correct velocity and position of the base (1/s)."""
@@ -44,6 +52,36 @@ LIFT_OFF_READINGS = 2
 """How many readings without load in a row are a lift-off; a single one may be noise."""
 
 
+class Memory(Record):
+    """What the estimator keeps between readings, world frame unless said.
+
+    Attributes:
+        dt: Time between readings (s).
+        weight: Of the robot (N).
+        base_R_imu: (3, 3) from the IMU's axes to those of the base.
+        readings: How many there were.
+        unloaded: How many in a row were without load.
+        airborne, has_flown: Whether the robot is in the air, and ever was: 0 or 1.
+        base_position, base_velocity: (3,) m, m/s.
+        base_twist: (6,) linear (m/s) and angular (rad/s), base axes.
+        soles: (2, 3) middles of the soles from the base, base axes (m).
+        footholds: (2, 3) where loaded soles stand (m).
+    """
+
+    dt: Number
+    weight: Number
+    base_R_imu: Rotation
+    readings: Number
+    unloaded: Number
+    airborne: Number
+    has_flown: Number
+    base_position: Vector
+    base_velocity: Vector
+    base_twist: Annotated[Array, (6,)]
+    soles: Annotated[Array, (2, 3)]
+    footholds: Annotated[Array, (2, 3)]
+
+
 class ImuEstimator:
     """Believes the feet as far as they stand, else the IMU."""
 
@@ -54,35 +92,36 @@ class ImuEstimator:
             kinematics: The model that :meth:`estimate` keeps up to date.
             dt: Time between readings (s).
         """
-        self._kinematics, self._dt = kinematics, dt
-        robot = kinematics.robot
-        n = robot.n_joints
-        self._legs = robot.left_leg, robot.right_leg
-        self._weight = GRAVITY * kinematics.mass
-        self._base_R_imu = pin.exp3(np.array([0.0, 0.0, BASE_YAW]))
-        self._state = RobotState(
-            joint_position=np.zeros(n),
-            joint_velocity=np.zeros(n),
-            base_rotation=np.eye(3),
-            angular_velocity=np.zeros(3),
-            com=np.zeros(3),
-            com_velocity=np.zeros(3),
-            angular_momentum=np.zeros(3),
-            foot_force=np.zeros(2),
-            sole_position=np.zeros((2, 3)),
-            gravity=np.zeros(3),
+        self._kinematics = kinematics
+        self._memory = Memory(
+            dt=dt,
+            weight=GRAVITY * kinematics.mass,
+            base_R_imu=pin.exp3(np.array([0.0, 0.0, BASE_YAW])),
         )
-        self._base_position, self._base_velocity = np.zeros(3), np.zeros(3)
-        self._base_twist = np.zeros(6)
-        self._soles = np.zeros((2, 3))
-        self._footholds = np.zeros((2, 3))
+        self._state = RobotState({"n": kinematics.robot.n_joints}, base_rotation=np.eye(3))
+        self._bind()
         self.reset()
+
+    def _bind(self) -> None:
+        left, right = self._kinematics.base_M_ankles
+        self._ankles = (
+            left.rotation, left.translation, right.rotation, right.translation,
+            *self._kinematics.ankle_p_soles,
+        )  # fmt: skip
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in vars(self).items() if name != "_ankles"}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        # Views of Pinocchio's buffers, which a copy takes of its own model.
+        vars(self).update(state)
+        self._bind()
 
     def reset(self) -> None:
         """A jump begins: the robot stands at rest on both feet, which anchor the world frame."""
-        self._readings = self._unloaded = 0
-        self._airborne = self._has_flown = False
-        self._base_velocity[:] = 0.0
+        memory = self._memory
+        memory.readings = memory.unloaded = memory.airborne = memory.has_flown = 0.0
+        memory.base_velocity[:] = 0.0
         self._state.gravity[:] = 0.0, 0.0, -1.0
 
     def refresh(self, readings: Readings) -> RobotState:
@@ -94,135 +133,261 @@ class ImuEstimator:
         """Take in the readings of one control tick; the next call overwrites the state."""
         kinematics, state = self._kinematics, self._state
         kinematics.update(readings.joint_position)
-        state.joint_position[:] = readings.joint_position
-        state.joint_velocity[:] = readings.joint_velocity
-        state.foot_force[:] = readings.foot_force
-        angular_velocity = self._base_R_imu.dot(readings.gyro)
-        if self._readings:
-            self._navigate(angular_velocity, self._base_R_imu.dot(readings.accelerometer))
-        else:
-            state.base_rotation[:] = kinematics.base_rotation
-            self._base_position[:] = kinematics.base_position
-            self._place_soles()
-            self._footholds[:] = state.sole_position
-        self._readings += 1
-        self._base_twist[3:] = angular_velocity
-        self._correct_attitude(self._base_R_imu.dot(readings.gravity))
-        self._place_soles()
-        self._stand()
-        self._conclude()
+        blocks = kinematics.block, readings.block, state.block, self._memory.block
+        find_soles(self._memory.block, *self._ankles)
+        self._predict(*blocks)
+        self._correct_attitude(*blocks)
+        self._stand(*blocks)
+        conclude(kinematics.data.Ag, kinematics.base_p_com, *blocks)
         return state
 
-    def _navigate(self, angular_velocity: Array, specific_force: Array) -> None:
-        """Inertial navigation over one period; base axes."""
-        state, dt = self._state, self._dt
-        R, velocity = state.base_rotation, self._base_velocity
-        turn = (angular_velocity + self._base_twist[3:]) * (0.5 * dt)
+    def _predict(self, *blocks: Block) -> None:
+        predict(*blocks)
+
+    def _correct_attitude(self, *blocks: Block) -> None:
+        correct_attitude(*blocks)
+
+    def _stand(self, *blocks: Block) -> None:
+        stand(self._kinematics.data.J, *blocks)
+
+
+@compiled
+def find_soles(
+    memory: Block,
+    left_R: Array,
+    left_p: Array,
+    right_R: Array,
+    right_p: Array,
+    left_sole: Array,
+    right_sole: Array,
+) -> None:
+    """Where the soles are from the base.
+
+    Args:
+        memory: Block of the :class:`Memory`, of which this sets the soles.
+        left_R: (3, 3) orientation of the left ankle, base axes.
+        left_p: (3,) its position (m).
+        right_R: Of the right ankle.
+        right_p: Likewise.
+        left_sole: (3,) middle of the left sole's underside in the frame of its ankle (m).
+        right_sole: Of the right sole.
+    """
+    soles = memory[0].soles
+    rotate(left_R, left_sole, soles[0])
+    rotate(right_R, right_sole, soles[1])
+    for i in range(3):
+        soles[0, i] += left_p[i]
+        soles[1, i] += right_p[i]
+
+
+@compiled
+def place_soles(state: Block, memory: Block) -> None:
+    """Where they are in the world."""
+    for foot in range(2):
+        rotate(state.base_rotation, memory.soles[foot], state.sole_position[foot])
+        for i in range(3):
+            state.sole_position[foot, i] += memory.base_position[i]
+
+
+@compiled
+def predict(kinematics: Block, readings: Block, state: Block, memory: Block) -> None:
+    """Take in the readings: inertial navigation over one period.
+
+    Args:
+        kinematics: The model, up to date.
+        readings: What the sensors said.
+        state: What is believed.
+        memory: Block of the :class:`Memory`.
+    """
+    k, told, s, m = kinematics[0], readings[0], state[0], memory[0]
+    s.joint_position[:] = told.joint_position
+    s.joint_velocity[:] = told.joint_velocity
+    s.foot_force[:] = told.foot_force
+    angular_velocity, specific_force = np.empty(3), np.empty(3)
+    rotate(m.base_R_imu, told.gyro, angular_velocity)
+    rotate(m.base_R_imu, told.accelerometer, specific_force)
+    if m.readings > 0.0:
+        turn, half = np.empty(3), np.empty(3)
+        for i in range(3):
+            turn[i] = (angular_velocity[i] + m.base_twist[3 + i]) * (0.5 * m.dt)
+            half[i] = 0.5 * turn[i]
         # The specific force is a mean over the period: it belongs to the middle of it.
-        gained = R.dot(pin.exp3(0.5 * turn).dot(specific_force))
-        gained += GRAVITY * state.gravity
-        gained *= dt
-        R[:] = R.dot(pin.exp3(turn))
-        self._base_position += dt * (velocity + 0.5 * gained)
-        velocity += gained
-
-    def _correct_attitude(self, down: Array) -> None:
-        """By the left sole, and by the direction of gravity, ``down`` ((3,) base axes)."""
-        kinematics, state = self._kinematics, self._state
-        R = state.base_rotation
-        # Whoever lands turned about the vertical stands as flat as before.
-        sole_turn = R.dot(pin.log3(R.T.dot(kinematics.base_rotation)))
-        sole_turn[2] = 0.0
-        tilt = math.hypot(sole_turn[0], sole_turn[1]) / FLATNESS
-        flat = self._load(float(state.foot_force[0]), 0.5) * math.exp(-tilt * tilt)
-        if not self._has_flown:
-            share = flat / min(self._readings, AVERAGED)
-            state.gravity += share * (kinematics.base_rotation.dot(down) - state.gravity)
-            state.gravity /= math.hypot(*state.gravity)
-        turn = self._share(FLAT_GAIN * flat) * sole_turn
-        turn += self._share(TILT_GAIN * (1.0 - flat)) * pin.skew(R.dot(down)).dot(state.gravity)
-        R[:] = pin.exp3(turn).dot(R)
-
-    def _place_soles(self) -> None:
-        kinematics, state = self._kinematics, self._state
-        for foot, (ankle, sole) in enumerate(
-            zip(kinematics.base_M_ankles, kinematics.ankle_p_soles, strict=True)
-        ):
-            self._soles[foot] = ankle.act(sole)
-        np.dot(self._soles, state.base_rotation.T, out=state.sole_position)
-        state.sole_position += self._base_position
-
-    def _stand(self) -> None:
-        """Correct velocity and position by the soles that carry load."""
-        kinematics, state = self._kinematics, self._state
-        left, right = state.foot_force.tolist()
-        load = self._load(left + right)
-        self._unloaded = self._unloaded + 1 if load == 0.0 else 0
-        if self._unloaded >= LIFT_OFF_READINGS:
-            self._airborne = self._has_flown = True
-        if load == 0.0:
-            return
-        if self._airborne:
-            self._touch_down()
-        taken = self._share(CONTACT_GAIN * load)
-        velocity, omega = np.zeros(3), self._base_twist[3:]
-        shares = _shares(left, right)
-        for foot, share in enumerate(shares):
-            if share == 0.0:
-                self._footholds[foot] = state.sole_position[foot]
-                continue
-            jacobian = (kinematics.J_left, kinematics.J_right)[foot]
-            twist = jacobian.dot(state.joint_velocity[self._legs[foot]])
-            # Of the base, in its own axes, if this sole stands still.
-            velocity -= share * (twist[:3] + pin.skew(omega + twist[3:]).dot(self._soles[foot]))
-        wanted = state.base_rotation.dot(velocity)
-        self._base_velocity += taken * (wanted - self._base_velocity)
-        shift = taken * np.dot(shares, self._footholds - state.sole_position)
-        self._base_position += shift
-        state.sole_position += shift
-
-    def _touch_down(self) -> None:
-        """What touches first is on the floor."""
-        state = self._state
-        self._airborne = False
-        height = state.sole_position[np.argmax(state.foot_force), 2]
-        self._base_position[2] -= height
-        state.sole_position[:, 2] -= height
-        self._footholds[:] = state.sole_position
-
-    def _conclude(self) -> None:
-        """CoM and momentum, in the air with what is known of their motion."""
-        kinematics, state = self._kinematics, self._state
-        R = state.base_rotation
-        np.dot(R, self._base_twist[3:], out=state.angular_velocity)
-        np.dot(self._base_velocity, R, out=self._base_twist[:3])
-        momentum = kinematics.A_base.dot(self._base_twist)
-        momentum += kinematics.A_joints.dot(state.joint_velocity)
-        velocity, angular_momentum = R.dot(momentum[:3]) / kinematics.mass, R.dot(momentum[3:])
-        if self._airborne:
-            # Only pushes change these.
-            share = self._share(BALLISTIC_GAIN)
-            state.com_velocity += (GRAVITY * self._dt) * state.gravity
-            velocity = state.com_velocity + share * (velocity - state.com_velocity)
-            angular_momentum -= state.angular_momentum
-            angular_momentum *= share
-            angular_momentum += state.angular_momentum
-        state.com_velocity[:], state.angular_momentum[:] = velocity, angular_momentum
-        np.dot(R, kinematics.base_p_com, out=state.com)
-        state.com += self._base_position
-
-    def _load(self, force: float, share: float = 1.0) -> float:
-        """How far a normal force (N) makes ``share`` of the feet a reference, from 0 to 1."""
-        load = (force / (share * self._weight) - NO_LOAD) / (FULL_LOAD - NO_LOAD)
-        return min(1.0, max(0.0, load))
-
-    def _share(self, gain: float) -> float:
-        """What a correction with a gain (1/s) takes off an error within one period."""
-        return 1.0 - math.exp(-gain * self._dt)
+        step, force, gained = np.empty((3, 3)), np.empty(3), np.empty(3)
+        rotation_of(half, step)
+        rotate(step, specific_force, force)
+        rotate(s.base_rotation, force, gained)
+        turn_by(s.base_rotation, turn)
+        for i in range(3):
+            gained[i] = m.dt * (gained[i] + GRAVITY * s.gravity[i])
+            m.base_position[i] += m.dt * (m.base_velocity[i] + 0.5 * gained[i])
+            m.base_velocity[i] += gained[i]
+    else:
+        s.base_rotation[:] = k.base_rotation
+        m.base_position[:] = k.base_position
+        place_soles(s, m)
+        m.footholds[:] = s.sole_position
+    m.readings += 1.0
+    m.base_twist[3:] = angular_velocity
 
 
-def _shares(left: float, right: float) -> tuple[float, float]:
-    """How far each sole counts, given their normal forces (N): not at all without load."""
+@compiled
+def turn_by(R: Array, turn: Array) -> None:
+    """Turn an attitude by a rotation vector (rad) in its own axes."""
+    step, before = np.empty((3, 3)), R.copy()
+    rotation_of(turn, step)
+    multiply(before, step, R)
+
+
+@compiled
+def correct_attitude(kinematics: Block, readings: Block, state: Block, memory: Block) -> None:
+    """By the left sole, and by the direction of gravity; arguments as of :func:`predict`."""
+    k, told, s, m = kinematics[0], readings[0], state[0], memory[0]
+    R = s.base_rotation
+    down, world_down, towards, sole_turn = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    rotate(m.base_R_imu, told.gravity, down)
+    # Whoever lands turned about the vertical stands as flat as before.
+    between = np.empty((3, 3))
+    multiply(R.T, k.base_rotation, between)
+    turn_of(between, towards)
+    rotate(R, towards, sole_turn)
+    sole_turn[2] = 0.0
+    tilt = math.hypot(sole_turn[0], sole_turn[1]) / FLATNESS
+    flat = load_of(m, s.foot_force[0], 0.5) * math.exp(-tilt * tilt)
+    if m.has_flown == 0.0:
+        share = flat / min(m.readings, AVERAGED)
+        rotate(k.base_rotation, down, world_down)
+        for i in range(3):
+            s.gravity[i] += share * (world_down[i] - s.gravity[i])
+        length = math.sqrt(s.gravity[0] ** 2 + s.gravity[1] ** 2 + s.gravity[2] ** 2)
+        for i in range(3):
+            s.gravity[i] /= length
+    by_sole, by_gravity = share_of(m, FLAT_GAIN * flat), share_of(m, TILT_GAIN * (1.0 - flat))
+    rotate(R, down, world_down)
+    for i in range(3):
+        sole_turn[i] *= by_sole
+    add_cross(world_down, s.gravity, by_gravity, sole_turn)
+    # About axes of the world.
+    rotate_back(R, sole_turn, towards)
+    turn_by(R, towards)
+
+
+@compiled
+def stand(J: Array, kinematics: Block, readings: Block, state: Block, memory: Block) -> None:
+    """Correct velocity and position by the soles that carry load.
+
+    Args:
+        J: (6, n + 6) Jacobians of all joints, base axes.
+        kinematics: The model, up to date.
+        readings: What the sensors said.
+        state: What is believed.
+        memory: Block of the :class:`Memory`.
+    """
+    s, m = state[0], memory[0]
+    place_soles(s, m)
+    left, right = s.foot_force[0], s.foot_force[1]
+    load = load_of(m, left + right, 1.0)
+    m.unloaded = m.unloaded + 1.0 if load == 0.0 else 0.0
+    if m.unloaded >= LIFT_OFF_READINGS:
+        m.airborne = m.has_flown = 1.0
+    if load == 0.0:
+        return
+    if m.airborne:
+        touch_down(s, m)
+    taken = share_of(m, CONTACT_GAIN * load)
     least = NO_LOAD * (max(left, 0.0) + max(right, 0.0))
-    left, right = (force if force > least else 0.0 for force in (left, right))
-    return left / (left + right), right / (left + right)
+    carried = (left if left > least else 0.0) + (right if right > least else 0.0)
+    velocity, world_velocity, shift = np.zeros(3), np.empty(3), np.zeros(3)
+    linear, turning = np.empty(3), np.empty(3)
+    for foot in range(2):
+        force = s.foot_force[foot]
+        if force <= least:
+            m.footholds[foot] = s.sole_position[foot]
+            continue
+        share = force / carried
+        for i in range(3):
+            linear[i], turning[i] = 0.0, m.base_twist[3 + i]
+            for j in range(6):
+                rate = s.joint_velocity[6 * foot + j]
+                linear[i] += J[i, 6 + 6 * foot + j] * rate
+                turning[i] += J[3 + i, 6 + 6 * foot + j] * rate
+        # Of the base, in its own axes, if this sole stands still.
+        add_cross(turning, m.soles[foot], -share, velocity)
+        for i in range(3):
+            velocity[i] -= share * linear[i]
+            shift[i] += share * (m.footholds[foot, i] - s.sole_position[foot, i])
+    rotate(s.base_rotation, velocity, world_velocity)
+    for i in range(3):
+        m.base_velocity[i] += taken * (world_velocity[i] - m.base_velocity[i])
+        m.base_position[i] += taken * shift[i]
+        for foot in range(2):
+            s.sole_position[foot, i] += taken * shift[i]
+
+
+@compiled
+def touch_down(state: Block, memory: Block) -> None:
+    """What touches first is on the floor."""
+    memory.airborne = 0.0
+    first = 1 if state.foot_force[1] > state.foot_force[0] else 0
+    height = state.sole_position[first, 2]
+    memory.base_position[2] -= height
+    for foot in range(2):
+        state.sole_position[foot, 2] -= height
+    memory.footholds[:] = state.sole_position
+
+
+@compiled
+def conclude(
+    A: Array,
+    base_p_com: Array,
+    kinematics: Block,
+    readings: Block,
+    state: Block,
+    memory: Block,
+) -> None:
+    """CoM and momentum, in the air with what is known of their motion.
+
+    Args:
+        A: (6, n + 6) centroidal momentum of base twist and joint velocities, base axes.
+        base_p_com: (3,) position of the CoM in the base (m).
+        kinematics: The model, up to date.
+        readings: What the sensors said.
+        state: What is believed.
+        memory: Block of the :class:`Memory`.
+    """
+    k, s, m = kinematics[0], state[0], memory[0]
+    rotate(s.base_rotation, m.base_twist[3:], s.angular_velocity)
+    rotate_back(s.base_rotation, m.base_velocity, m.base_twist[:3])
+    momentum = np.zeros(6)
+    for i in range(6):
+        for j in range(6):
+            momentum[i] += A[i, j] * m.base_twist[j]
+        for j in range(s.joint_velocity.shape[0]):
+            momentum[i] += A[i, 6 + j] * s.joint_velocity[j]
+    velocity, angular_momentum = np.empty(3), np.empty(3)
+    rotate(s.base_rotation, momentum[:3], velocity)
+    rotate(s.base_rotation, momentum[3:], angular_momentum)
+    rotate(s.base_rotation, base_p_com, s.com)
+    share = share_of(m, BALLISTIC_GAIN)
+    for i in range(3):
+        s.com[i] += m.base_position[i]
+        velocity[i] /= k.total_mass
+        if m.airborne:
+            # Only pushes change these.
+            falling = s.com_velocity[i] + GRAVITY * m.dt * s.gravity[i]
+            s.com_velocity[i] = falling + share * (velocity[i] - falling)
+            s.angular_momentum[i] += share * (angular_momentum[i] - s.angular_momentum[i])
+        else:
+            s.com_velocity[i], s.angular_momentum[i] = velocity[i], angular_momentum[i]
+
+
+@compiled
+def load_of(memory: Block, force: float, share: float) -> float:
+    """How far a normal force (N) makes ``share`` of the feet a reference, from 0 to 1."""
+    load: float = (force / (share * memory.weight) - NO_LOAD) / (FULL_LOAD - NO_LOAD)
+    return min(1.0, max(0.0, load))
+
+
+@compiled
+def share_of(memory: Block, gain: float) -> float:
+    """What a correction with a gain (1/s) takes off an error within one period."""
+    return 1.0 - math.exp(-gain * memory.dt)

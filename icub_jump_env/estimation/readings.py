@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, PerJoint, Record, Vector
 
 
-@dataclass(slots=True)
-class Readings:
+class Readings(Record):
     """Sensor readings of one control tick, SI units; whoever senses fills one again and again.
 
     The IMU frame sits on the base and faces forward: x forward, y left, z up.
@@ -26,14 +22,14 @@ class Readings:
         foot_force: (2,) normal force under the left and right sole (N).
     """
 
-    joint_position: Array
-    joint_velocity: Array
-    gravity: Array = field(default_factory=lambda: np.zeros(3))
-    gyro: Array = field(default_factory=lambda: np.zeros(3))
-    accelerometer: Array = field(default_factory=lambda: np.zeros(3))
-    foot_force: Array = field(default_factory=lambda: np.zeros(2))
+    joint_position: PerJoint
+    joint_velocity: PerJoint
+    gravity: Vector
+    gyro: Vector
+    accelerometer: Vector
+    foot_force: Annotated[Array, (2,)]
 
     @classmethod
     def of(cls, n_joints: int) -> Readings:
         """Readings of ``n_joints`` joints, all zero."""
-        return cls(np.zeros(n_joints), np.zeros(n_joints))
+        return cls({"n": n_joints})

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, PerJoint, Record, Rotation, Vector
 
 
-@dataclass(slots=True)
-class RobotState:
+class RobotState(Record):
     """Believed state at one control tick, SI units, world frame.
 
-    An estimator fills one instance again and again; arrays may be views of its readings
-    and of the model that it keeps up to date.
+    An estimator fills one instance again and again.
 
     Attributes:
         joint_position: (n,) s (rad).
@@ -30,13 +25,13 @@ class RobotState:
         gravity: (3,) direction of gravity, unit vector; where the floor is level, -z.
     """
 
-    joint_position: Array
-    joint_velocity: Array
-    base_rotation: Array
-    angular_velocity: Array
-    com: Array
-    com_velocity: Array
-    angular_momentum: Array
-    foot_force: Array
-    sole_position: Array
-    gravity: Array
+    joint_position: PerJoint
+    joint_velocity: PerJoint
+    base_rotation: Rotation
+    angular_velocity: Vector
+    com: Vector
+    com_velocity: Vector
+    angular_momentum: Vector
+    foot_force: Annotated[Array, (2,)]
+    sole_position: Annotated[Array, (2, 3)]
+    gravity: Vector

@@ -6,18 +6,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from icub_jump_env.metrics.jump import (
-    AIRBORNE_FORCE,
-    JointLimits,
-    JumpMetrics,
-    JumpRecorder,
-    SuccessConfig,
-)
+from icub_jump_env.compiled import compiled
+from icub_jump_env.metrics.jump import JumpMetrics, SuccessConfig
+from icub_jump_env.metrics.recorder import AIRBORNE_FORCE, JumpRecorder, has_stood
 from icub_jump_env.metrics.state import TrueState
-
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, Block, Number, Record
+from icub_jump_env.robot.limits import JointLimits
 
 FALLEN_TILT = math.radians(60.0)
 """Chest tilt (rad) beyond which the robot has fallen."""
@@ -28,6 +23,21 @@ TAKEOFF_GRACE = 0.5
 
 NEXT_GRACE = 3.0
 """Time after touch-down (s) within which the next jump, if there is one, must have begun."""
+
+OUTCOMES = ("running", "fell", "stood", "no take-off")
+"""By the number that :func:`judge` returns."""
+
+
+class Rules(Record):
+    """What :func:`judge` goes by.
+
+    Attributes:
+        takeoff_time: T of the present jump (s).
+        is_last: Whether no jump follows: 0 or 1.
+    """
+
+    takeoff_time: Number
+    is_last: Number
 
 
 class Jump(NamedTuple):
@@ -47,7 +57,7 @@ class SeriesRecorder:
 
     Attributes:
         present: Watches the latest jump.
-        jumps: All that have begun.
+        rules: When the episode is over.
     """
 
     def __init__(self, total: int, limits: JointLimits, success: SuccessConfig) -> None:
@@ -61,60 +71,62 @@ class SeriesRecorder:
         self._total = total
         self.present = JumpRecorder(limits, success.stand_time)
         self._success = success
-        self.jumps: list[Jump] = []
+        self.rules = Rules()
+        self._heights: list[float] = []
+        self._ended: list[Jump] = []
         self._start = np.zeros(2)
-        self._began = 0.0
 
     def reset(self) -> None:
         """An episode begins."""
-        self.jumps = []
+        self._heights, self._ended = [], []
 
-    def begin(self, height: float, state: TrueState, time: float, rest: float | None) -> None:
+    @property
+    def begun(self) -> int:
+        """How many jumps have begun."""
+        return len(self._heights)
+
+    @property
+    def jumps(self) -> list[Jump]:
+        """All jumps that have begun; the last one is as it is now."""
+        return [*self._ended, Jump(self._heights[-1], self.present.metrics)]
+
+    def begin(
+        self,
+        height: float,
+        takeoff_time: float,
+        state: TrueState,
+        time: float,
+        rest: float | None,
+    ) -> None:
         """A jump begins, and the one before is over.
 
         Args:
             height: Commanded height (m).
+            takeoff_time: T of its plan (s).
             state: The true state.
             time: Time since the start of the episode (s).
             rest: How long the robot stands before the next crouch (s); ``None`` in the last
                 jump.
         """
-        if self.jumps:
+        if self._heights:
             self.present.conclude()
+            self._ended.append(Jump(self._heights[-1], self.present.metrics))
         else:
             self._start[:] = _between_the_feet(state)
-        self._began = time
+        self._heights.append(height)
         self.present.reset(time, rest)
-        self.jumps.append(Jump(height, self.present.metrics))
+        self.rules.takeoff_time, self.rules.is_last = takeoff_time, float(self.is_last)
 
-    def judge(self, state: TrueState, duration: float) -> str:
-        """The outcome of the episode; while it goes on, ``running``.
-
-        Args:
-            state: The true state.
-            duration: Take-off time T of the present jump (s).
-        """
-        if not state.only_feet_touch or state.chest_tilt > FALLEN_TILT:
-            return "fell"
-        if self.is_last and self.present.stood:
-            return "stood"
-        time, touchdown = state.time - self._began, self.present.touchdown_time
-        airborne = state.ground_force < AIRBORNE_FORCE
-        if (
-            time >= duration + TAKEOFF_GRACE
-            and not airborne
-            and math.isnan(self.present.metrics.takeoff_time)
-        ):
-            return "no take-off"
-        # A robot that does not notice its landing waits for it.
-        if not self.is_last and time - touchdown >= NEXT_GRACE:
-            return "no take-off"
-        return "running"
+    @property
+    def blocks(self) -> tuple[Block, Block, Block]:
+        """What watches and judges a physics step: limits, rules and record."""
+        present = self.present
+        return present.limits.block, self.rules.block, present.record.block
 
     @property
     def is_last(self) -> bool:
         """Whether no jump follows."""
-        return len(self.jumps) == self._total
+        return len(self._heights) == self._total
 
     @property
     def is_success(self) -> bool:
@@ -154,3 +166,29 @@ def _between_the_feet(state: TrueState) -> Array:
     left, right = state.sole_position
     middle: Array = (left[:2] + right[:2]) / 2
     return middle
+
+
+@compiled
+def judge(state: Block, rules: Block, record: Block) -> int:
+    """The number of the episode's outcome in the true state, among :data:`OUTCOMES`.
+
+    Args:
+        state: Block of the :class:`icub_jump_env.metrics.state.TrueState`.
+        rules: Block of the :class:`Rules`.
+        record: Block of what the :class:`icub_jump_env.metrics.recorder.JumpRecorder` has.
+    """
+    s, r, jump = state[0], rules[0], record[0]
+    tilt = math.acos(min(1.0, max(-1.0, s.chest_up[2])))
+    if not s.only_feet_touch or tilt > FALLEN_TILT:
+        return 1
+    if r.is_last and has_stood(jump):
+        return 2
+    time = s.time - jump.start
+    airborne = s.ground_force < AIRBORNE_FORCE
+    late = time >= r.takeoff_time + TAKEOFF_GRACE
+    if late and not airborne and math.isnan(jump.takeoff_time):
+        return 3
+    # A robot that does not notice its landing waits for it.
+    if not r.is_last and time - jump.touchdown_time >= NEXT_GRACE:
+        return 3
+    return 0

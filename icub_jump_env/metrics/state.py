@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, Number, PerJoint, Record, Vector
 
 
-@dataclass(slots=True)
-class TrueState:
+class TrueState(Record):
     """The true state at one instant, in SI units and the world frame.
 
     World frame: +x where the robot faces, +y left, +z up. Whoever simulates fills one
-    instance again and again; arrays may be views.
+    instance again and again.
 
     Attributes:
         time: Time since the start of the episode (s).
@@ -26,29 +22,38 @@ class TrueState:
         locked_inertia: (3, 3) inertia of the equivalent rigid body about the CoM.
         ground_force: Vertical force of the ground on the robot (N).
         sole_height: Height of the lowest corner of the lower sole (m).
-        only_feet_touch: Whether nothing but the soles touches the ground.
+        only_feet_touch: Whether nothing but the soles touches the ground: 0 or 1.
         base_pitch: Pitch of the base about +y, zero when upright (rad).
-        sole_position: Centres of the left and the right sole, (3,) each.
+        sole_position: (2, 3) centres of the left and the right sole.
         chest_up: (3,) the chest's up axis.
         joint_position: (n,) rad.
         joint_velocity: (n,) rad/s.
         joint_torque: (n,) Nm.
     """
 
-    time: float = 0.0
-    com: Array = field(default_factory=lambda: np.zeros(3))
-    com_velocity: Array = field(default_factory=lambda: np.zeros(3))
-    angular_momentum: Array = field(default_factory=lambda: np.zeros(3))
-    locked_inertia: Array = field(default_factory=lambda: np.eye(3))
-    ground_force: float = 0.0
-    sole_height: float = 0.0
-    only_feet_touch: bool = True
-    base_pitch: float = 0.0
-    sole_position: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
-    chest_up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    joint_position: Array = field(default_factory=lambda: np.zeros(0))
-    joint_velocity: Array = field(default_factory=lambda: np.zeros(0))
-    joint_torque: Array = field(default_factory=lambda: np.zeros(0))
+    time: Number
+    com: Vector
+    com_velocity: Vector
+    angular_momentum: Vector
+    locked_inertia: Annotated[Array, (3, 3)]
+    ground_force: Number
+    sole_height: Number
+    only_feet_touch: Number
+    base_pitch: Number
+    sole_position: Annotated[Array, (2, 3)]
+    chest_up: Vector
+    joint_position: PerJoint
+    joint_velocity: PerJoint
+    joint_torque: PerJoint
+
+    def __init__(self, n_joints: int, **values: Any) -> None:
+        """An upright robot of ``n_joints`` joints, but for the ``values`` of some fields."""
+        upright = {
+            "locked_inertia": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+            "only_feet_touch": True,
+            "chest_up": (0.0, 0.0, 1.0),
+        }
+        super().__init__({"n": n_joints}, **(upright | values))
 
     @property
     def chest_tilt(self) -> float:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
-
+from icub_jump_env.compiled import compiled
+from icub_jump_env.records import Array
 
 PEAK_SPEED = 1.875
 """Largest speed of the motion, in way per duration."""
 
 
+@compiled
 def progress(u: Any) -> tuple[Any, Any]:
     """Share of the way, and its derivative, at a share ``u`` of the duration."""
     return u**3 * (10 - 15 * u + 6 * u**2), 30 * u**2 * (1 - u) ** 2

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from icub_jump_env.records import Array, PerJoint, Record, Vector
 from icub_jump_env.robot.statics import Stance
-
-Array = NDArray[np.float64]
 
 PlannerName = Literal["scaled_curve", "whole_body"]
 
 
-@dataclass(slots=True)
-class Setpoint:
+class Setpoint(Record):
     """What the robot shall do at one instant, SI units, world axes; reused buffers.
 
     Attributes:
@@ -31,28 +25,19 @@ class Setpoint:
         posture_acceleration: (n,) rad/s^2.
     """
 
-    com_position: Array
-    com_velocity: Array
-    com_acceleration: Array
-    angular_momentum: Array
-    angular_momentum_rate: Array
-    posture: Array
-    posture_velocity: Array
-    posture_acceleration: Array
+    com_position: Vector
+    com_velocity: Vector
+    com_acceleration: Vector
+    angular_momentum: Vector
+    angular_momentum_rate: Vector
+    posture: PerJoint
+    posture_velocity: PerJoint
+    posture_acceleration: PerJoint
 
     @classmethod
     def at_rest(cls, posture: Array) -> Setpoint:
         """Rest in a posture ((n,) rad) with the CoM at the origin."""
-        return cls(
-            com_position=np.zeros(3),
-            com_velocity=np.zeros(3),
-            com_acceleration=np.zeros(3),
-            angular_momentum=np.zeros(3),
-            angular_momentum_rate=np.zeros(3),
-            posture=posture.copy(),
-            posture_velocity=np.zeros_like(posture),
-            posture_acceleration=np.zeros_like(posture),
-        )
+        return cls({"n": len(posture)}, posture=posture)
 
 
 class JumpPlan(Protocol):

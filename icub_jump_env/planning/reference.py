@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
-from numpy.typing import NDArray
 
+from icub_jump_env.compiled import compiled
 from icub_jump_env.planning.plan import JumpPlan, Setpoint
 from icub_jump_env.planning.residual import ResidualFilter
-
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, Block
 
 
 class Reference:
@@ -32,19 +29,21 @@ class Reference:
         self._plan = plan
         self._start[:] = com
         self.residual.reset()
-        planned = plan.sample(0.0)
-        self.setpoint = dataclasses.replace(
-            planned,
-            com_position=np.zeros(3),
-            com_velocity=np.zeros(3),
-            com_acceleration=np.zeros(3),
-        )
+        self.setpoint = Setpoint.at_rest(plan.stance.posture)
         self.update(0.0)
 
     def update(self, time: float) -> None:
         """Set the set point for ``time`` (s) after the start."""
-        setpoint, residual, planned = self.setpoint, self.residual, self._plan.sample(time)
-        np.add(self._start, residual.offset, out=setpoint.com_position)
-        setpoint.com_position += planned.com_position
-        np.add(residual.velocity, planned.com_velocity, out=setpoint.com_velocity)
-        np.add(residual.acceleration, planned.com_acceleration, out=setpoint.com_acceleration)
+        planned = self._plan.sample(time)
+        move(planned.block, self._start, self.residual.block, self.setpoint.block)
+
+
+@compiled
+def move(planned: Block, start: Array, residual: Block, setpoint: Block) -> None:
+    """Begin a plan at ``start`` ((3,) m) and add a residual."""
+    setpoint[0] = planned[0]
+    moved, shift = setpoint[0], residual[0]
+    for i in range(3):
+        moved.com_position[i] += start[i] + shift.offset[i]
+        moved.com_velocity[i] += shift.velocity[i]
+        moved.com_acceleration[i] += shift.acceleration[i]

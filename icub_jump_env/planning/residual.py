@@ -6,12 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
 from icub_jump_env.checks import check_choice, check_number, check_numbers, store
-
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, Record, Vector
 
 RESIDUAL_TIME = 0.7
 """How long a residual acts after the launch, where it does (s): a flight takes 0.2 s, and
@@ -52,7 +48,7 @@ class ResidualConfig:
         )
 
 
-class ResidualFilter:
+class ResidualFilter(Record):
     """Critically damped second-order filter with exact steps.
 
     Turns a piecewise constant target offset (m) into an offset with consistent velocity
@@ -65,11 +61,13 @@ class ResidualFilter:
         acceleration: (3,) m/s^2.
     """
 
+    offset: Vector
+    velocity: Vector
+    acceleration: Vector
+
     def __init__(self, bandwidth: float) -> None:
+        super().__init__()
         self._bandwidth = bandwidth
-        self.offset = np.zeros(3)
-        self.velocity = np.zeros(3)
-        self.acceleration = np.zeros(3)
         self._at_rest = True
 
     def reset(self) -> None:

@@ -16,15 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from icub_jump_env.compiled import compiled
+
 Array = NDArray[np.float64]
 
 _WXYZ = [6, 3, 4, 5]
 _XYZW = [4, 5, 6, 3]
 
 
+@compiled
 def heading(base_rotation: Array) -> tuple[float, float]:
     """Cosine and sine of the yaw of where a base ((3, 3), world) faces: its own -x."""
-    x, y = -float(base_rotation[0, 0]), -float(base_rotation[1, 0])
+    x, y = -base_rotation[0, 0], -base_rotation[1, 0]
     length = math.hypot(x, y)
     return x / length, y / length
 

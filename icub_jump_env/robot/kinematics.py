@@ -9,16 +9,16 @@ velocities alone; this module computes that function.
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation as Turn
 
+from icub_jump_env.compiled import compiled
+from icub_jump_env.linear_algebra import rotate
+from icub_jump_env.records import Array, Block, Number, Record, Rotation, Vector
 from icub_jump_env.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @functools.cache
@@ -40,12 +40,12 @@ def build_pinocchio_model(robot: Robot) -> Any:
     return pin.Model(_cached_model(robot))
 
 
-class FeetFixedKinematics:
+class FeetFixedKinematics(Record):
     """CoM and centroidal momentum as functions of the joints, feet fixed to the floor.
 
     An estimator calls :meth:`update` once per control tick; the attributes are buffers
-    that the next update overwrites. World frame: origin on the floor below the middle of the sole frames, +x
-    where the robot faces, +z up.
+    that the next update overwrites. World frame: origin on the floor below the middle of the sole
+    frames, +x where the robot faces, +z up.
 
     Attributes:
         robot: The robot; n is the number of its joints.
@@ -66,36 +66,43 @@ class FeetFixedKinematics:
         base_M_ankles: ``pinocchio.SE3`` of the left and right ankle roll joint, base frame.
         ankle_p_soles: (3,) middle of each sole's underside in the frame of its ankle (m).
         J_left: (6, 6) twist of the left foot of the left leg's joints, base frame.
-        J_right: (6, 6) the same of the right foot.
         model: The Pinocchio model, shared; do not change it.
         sole_positions: (2, 3) middle of the underside of the left and right sole, both at rest
             on the floor (m).
         world_M_left_sole: ``pinocchio.SE3`` of the left sole frame, which stands still.
         world_M_ankle: Likewise of the left ankle roll joint.
+        world_R_ankle, world_p_ankle, total_mass: Rotation and translation of it, and the mass, for
+            compiled functions.
     """
 
+    com: Vector
+    centroidal_map: Annotated[Array, (6, "n")]
+    J_feet: Annotated[Array, (6, "n")]
+    base_rotation: Rotation
+    base_position: Vector
+    world_R_ankle: Rotation
+    world_p_ankle: Vector
+    total_mass: Number
+
     def __init__(self, robot: Robot) -> None:
-        n = robot.n_joints
         self.robot = robot
         self.model = _cached_model(robot)
         self.data = self.model.createData()
         self._q = pin.neutral(self.model)
         self.mass = float(pin.computeTotalMass(self.model))
-        self._inverse_mass = 1.0 / self.mass
-        self.com = np.zeros(3)
-        self.centroidal_map = np.zeros((6, n))
-        self.J_com, self.J_momentum = self.centroidal_map[:3], self.centroidal_map[3:]
-        self.J_feet = np.zeros((6, n))
-        self.base_rotation = np.eye(3)
-        self.base_position = np.zeros(3)
-
         ankle = self._place_left_ankle()
-        self._world_R_ankle = self.world_M_ankle.rotation.copy()
-        self._world_p_ankle = self.world_M_ankle.translation.copy()
+        super().__init__(
+            {"n": robot.n_joints},
+            base_rotation=np.eye(3),
+            world_R_ankle=self.world_M_ankle.rotation,
+            world_p_ankle=self.world_M_ankle.translation,
+            total_mass=self.mass,
+        )
+        self.J_com, self.J_momentum = self.centroidal_map[:3], self.centroidal_map[3:]
         # Views of Pinocchio's buffers: reading an attribute costs more than using it.
         data = self.data
         self.A_base, self.A_joints = data.Ag[:, :6], data.Ag[:, 6:]
-        self.J_left, self.J_right = data.J[:, 6:12], data.J[:, 12:18]
+        self.J_left = data.J[:, 6:12]
         self.base_p_com = data.com[0]
         frames = [self.model.frames[self.model.getFrameId(name)] for name in robot.sole_frames]
         self.base_M_ankles = [data.oMi[frame.parentJoint] for frame in frames]
@@ -105,11 +112,9 @@ class FeetFixedKinematics:
         self._base_R_spine = data.oMi[chest.parentJoint].rotation
         self._spine_chest_up = chest.placement.rotation[:, 1].copy()
         placement = data.oMi[ankle]
-        self._ankle_R_base, self._base_p_ankle = placement.rotation.T, placement.translation
-        self._joint_map = np.zeros((6, n))
-        self._joint_map_left = self._joint_map[:, robot.left_leg]
-        self._J_feet_left = self.J_feet[:, robot.left_leg]
-        self._J_feet_right = self.J_feet[:, robot.right_leg]
+        self._buffers = (
+            data.Ag, data.J, placement.rotation, placement.translation, self.base_p_com, self.block,
+        )  # fmt: skip
 
     def __reduce__(self) -> tuple[type[FeetFixedKinematics], tuple[Robot]]:
         # The buffers are views of Pinocchio's; a copy takes its own at its next update.
@@ -135,7 +140,7 @@ class FeetFixedKinematics:
     def configuration(self, posture: Array) -> Array:
         """Pinocchio's configuration (n + 7,) of a posture (n,) (rad), soles on the floor."""
         self.update(posture)
-        quaternion = Rotation.from_matrix(self.base_rotation).as_quat()
+        quaternion = Turn.from_matrix(self.base_rotation).as_quat()
         return np.concatenate((self.base_position, quaternion, posture))
 
     def chest_up(self) -> Array:
@@ -163,20 +168,63 @@ class FeetFixedKinematics:
         Args:
             joint_position: (n,) joint positions (rad).
         """
-        # With the base at the origin, its columns of J are the identity, so that the
-        # base twist for a left foot at rest is minus the left leg's contribution.
         self._q[7:] = joint_position
         pin.computeCentroidalMap(self.model, self.data, self._q)
-        self._J_feet_left[:] = self.J_left
-        np.negative(self.J_right, out=self._J_feet_right)
+        stand_on_left_foot(*self._buffers)
 
-        R = np.dot(self._world_R_ankle, self._ankle_R_base, out=self.base_rotation)
-        np.subtract(self._world_p_ankle, R.dot(self._base_p_ankle), out=self.base_position)
-        np.add(R.dot(self.base_p_com), self.base_position, out=self.com)
 
-        joint_map = self._joint_map
-        joint_map[:] = self.A_joints
-        self._joint_map_left -= self.A_base.dot(self.J_left)
-        np.dot(R, joint_map[:3], out=self.J_com)
-        np.dot(R, joint_map[3:], out=self.J_momentum)
-        self.J_com *= self._inverse_mass
+@compiled
+def stand_on_left_foot(
+    A: Array,
+    J: Array,
+    base_R_ankle: Array,
+    base_p_ankle: Array,
+    base_p_com: Array,
+    kinematics: Block,
+) -> None:
+    """From a robot whose base is at the origin to one whose left foot stands still.
+
+    Args:
+        A: (6, n + 6) centroidal momentum of base twist and joint velocities, base axes.
+        J: (6, n + 6) Jacobians of all joints, base axes.
+        base_R_ankle: (3, 3) orientation of the left ankle.
+        base_p_ankle: (3,) its position (m).
+        base_p_com: (3,) position of the CoM (m).
+        kinematics: Block of the :class:`FeetFixedKinematics`, which this fills.
+    """
+    k = kinematics[0]
+    n = k.J_feet.shape[1]
+    R, p, com = k.base_rotation, k.base_position, k.com
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = (
+                k.world_R_ankle[i, 0] * base_R_ankle[j, 0]
+                + k.world_R_ankle[i, 1] * base_R_ankle[j, 1]
+                + k.world_R_ankle[i, 2] * base_R_ankle[j, 2]
+            )
+    rotate(R, base_p_ankle, p)
+    rotate(R, base_p_com, com)
+    for i in range(3):
+        p[i] = k.world_p_ankle[i] - p[i]
+        com[i] += p[i]
+
+    # With the base at the origin, its columns of J are the identity, so that the base twist for a
+    # left foot at rest is minus the left leg's contribution. The legs' joints come first.
+    joints = np.empty((6, n))
+    for i in range(6):
+        for j in range(n):
+            joints[i, j] = A[i, 6 + j]
+        for j in range(6):
+            for row in range(6):
+                joints[i, j] -= A[i, row] * J[row, 6 + j]
+            k.J_feet[i, j] = J[i, 6 + j]
+            k.J_feet[i, 6 + j] = -J[i, 12 + j]
+    for half in range(2):
+        scale = 1.0 if half else 1.0 / k.total_mass
+        for i in range(3):
+            for j in range(n):
+                k.centroidal_map[3 * half + i, j] = scale * (
+                    R[i, 0] * joints[3 * half, j]
+                    + R[i, 1] * joints[3 * half + 1, j]
+                    + R[i, 2] * joints[3 * half + 2, j]
+                )

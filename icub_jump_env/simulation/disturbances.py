@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import enum
 import math
-from dataclasses import dataclass
+from typing import Annotated
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from icub_jump_env.metrics.jump import AIRBORNE_FORCE
+from icub_jump_env.compiled import compiled
+from icub_jump_env.metrics.recorder import AIRBORNE_FORCE
+from icub_jump_env.records import Array, Block, Number, Record
 from icub_jump_env.robot.mujoco_model import (
     BLOCK_HALF_SIZE,
     EDGE_GEOM,
@@ -31,31 +32,28 @@ EDGE_DISTANCE = 0.02
 """From the middle of the left sole to where the edge begins (m)."""
 
 
-class Stage(enum.Enum):
-    """Which event is awaited."""
-
-    LIFT_OFF = enum.auto()
-    APEX = enum.auto()
-    TOUCHDOWN = enum.auto()
-    NONE = enum.auto()
+NONE, LIFT_OFF, APEX, TOUCHDOWN = range(4)
+"""Which event is awaited."""
 
 
-@dataclass(frozen=True)
-class Push:
-    """A constant horizontal force on the chest's CoM: from ``start`` to ``end`` (s), x and y (N)."""
+class Awaited(Record):
+    """What comes in an episode.
 
-    start: float
-    end: float
-    x: float
-    y: float
+    Attributes:
+        dt: Physics step (s).
+        stage: The event that is awaited.
+        ground_force, rise: Where in ``sensordata`` the ground's vertical force (N) and the CoM's
+            vertical velocity (m/s) are.
+        airborne_steps: For how many steps a rising robot has been in the air.
+        pushes: (3, 4) constant forces on the chest's CoM: begin and end (s), x and y (N).
+    """
 
-    @staticmethod
-    def of(impulse: float, direction: float, start: float) -> Push:
-        """The push that gives ``impulse`` (N s) along ``direction`` (rad), from ``start`` (s)."""
-        force = impulse / PUSH_DURATION
-        return Push(
-            start, start + PUSH_DURATION, force * math.cos(direction), force * math.sin(direction)
-        )
+    dt: Number
+    stage: Number
+    ground_force: Number
+    rise: Number
+    airborne_steps: Number
+    pushes: Annotated[Array, (3, 4)]
 
 
 class Disturbances:
@@ -64,6 +62,9 @@ class Disturbances:
     Each event comes once. Lift-off: the ground has carried less than 1 N for 5 ms while the CoM
     rises. Apex: the CoM does not rise any more. Touch-down: the ground carries 1 N again. All
     are noticed at the physics step after.
+
+    Attributes:
+        awaited: What comes.
     """
 
     def __init__(self, physics: Physics, world: World, launch_duration: float) -> None:
@@ -77,58 +78,42 @@ class Disturbances:
         self._physics = physics
         self._world = world
         model = physics.model
-        self._dt = float(model.opt.timestep)
-        self._ground_force = int(model.sensor("floor_force").adr[0]) + 3
-        self._rise = int(model.sensor("com_velocity").adr[0]) + 2
-        self._airborne_steps = 0
-        self._pushes: list[Push] = []
-        self._stage = Stage.LIFT_OFF if _has_events(world) else Stage.NONE
+        self.awaited = Awaited(
+            dt=model.opt.timestep,
+            stage=LIFT_OFF if _has_events(world) else NONE,
+            ground_force=model.sensor("floor_force").adr[0] + 3,
+            rise=model.sensor("com_velocity").adr[0] + 2,
+        )
+        self._n_pushes = 0
         if world.push != 0.0:
             start = world.push_time * (launch_duration - PUSH_DURATION)
-            self._pushes.append(Push.of(world.push, world.push_direction, start))
+            self._push(world.push, world.push_direction, start)
 
-    @staticmethod
-    def of(physics: Physics, world: World, launch_duration: float) -> Disturbances | None:
-        """The disturbances of a world; None where there are none, which costs no time."""
-        if world.push == 0.0 and not _has_events(world):
-            return None
-        return Disturbances(physics, world, launch_duration)
+    def happen(self) -> None:
+        """The awaited event has come."""
+        awaited, world = self.awaited, self._world
+        # Between two steps, so that rounding does not change for how many of them a push acts.
+        now = self._physics.data.time - awaited.dt / 2
+        if awaited.stage == LIFT_OFF:
+            awaited.stage = APEX
+            self._spin(world.takeoff_spin)
+            start = now + world.flight_push_time
+            self._push(world.flight_push, world.flight_push_direction, start)
+        elif awaited.stage == APEX:
+            awaited.stage = TOUCHDOWN
+            self._change_ground()
+        else:
+            awaited.stage = NONE
+            start = now + world.landing_push_time
+            self._push(world.landing_push, world.landing_push_direction, start)
 
-    def act(self) -> None:
-        """Do what is due; call before each physics step."""
-        data = self._physics.data
-        if self._stage is not Stage.NONE:
-            sensors = data.sensordata
-            self._watch(sensors[self._ground_force], sensors[self._rise])
-        time, x, y = data.time, 0.0, 0.0
-        for push in self._pushes:
-            if push.start <= time < push.end:
-                x += push.x
-                y += push.y
-        self._physics.chest_force[:2] = x, y
-
-    def _watch(self, ground_force: float, rise: float) -> None:
-        """Notice events from the vertical ground force (N) and the vertical CoM velocity (m/s)."""
-        world, airborne = self._world, ground_force < AIRBORNE_FORCE
-        if self._stage is Stage.LIFT_OFF:
-            self._airborne_steps = self._airborne_steps + 1 if airborne and rise > 0.0 else 0
-            if self._airborne_steps * self._dt >= AIRBORNE_TIME - 1e-9:
-                self._stage = Stage.APEX
-                self._spin(world.takeoff_spin)
-                self._push(world.flight_push, world.flight_push_direction, world.flight_push_time)
-        elif self._stage is Stage.APEX:
-            if rise <= 0.0:
-                self._stage = Stage.TOUCHDOWN
-                self._change_ground()
-        elif not airborne:
-            self._stage = Stage.NONE
-            self._push(world.landing_push, world.landing_push_direction, world.landing_push_time)
-
-    def _push(self, impulse: float, direction: float, delay: float) -> None:
+    def _push(self, impulse: float, direction: float, start: float) -> None:
         if impulse != 0.0:
-            # Between two steps, so that rounding does not change for how many of them it acts.
-            start = self._physics.data.time + delay - self._dt / 2
-            self._pushes.append(Push.of(impulse, direction, start))
+            force = impulse / PUSH_DURATION
+            self.awaited.pushes[self._n_pushes] = (
+                start, start + PUSH_DURATION, force * math.cos(direction), force * math.sin(direction),
+            )  # fmt: skip
+            self._n_pushes += 1
 
     def _spin(self, rate: float) -> None:
         """Add an angular velocity (rad/s) about +y and the CoM to the robot as a whole."""
@@ -191,3 +176,29 @@ def _has_events(world: World) -> bool:
             world.step, world.edge, world.landing_push,
         )
     )  # fmt: skip
+
+
+@compiled
+def comes(sensordata: Array, awaited: Block) -> bool:
+    """Whether the awaited event has come; call once before each physics step."""
+    a = awaited[0]
+    if a.stage == NONE:
+        return False
+    airborne = sensordata[int(a.ground_force)] < AIRBORNE_FORCE
+    rises = sensordata[int(a.rise)] > 0.0
+    if a.stage == LIFT_OFF:
+        a.airborne_steps = a.airborne_steps + 1.0 if airborne and rises else 0.0
+        lifted: bool = a.airborne_steps * a.dt >= AIRBORNE_TIME - 1e-9
+        return lifted
+    return not rises if a.stage == APEX else not airborne
+
+
+@compiled
+def push(time: float, awaited: Block, force: Array) -> None:
+    """Set the external force on the chest, (3,) (N), at a time (s)."""
+    pushes = awaited[0].pushes
+    force[0] = force[1] = 0.0
+    for k in range(pushes.shape[0]):
+        if pushes[k, 0] <= time < pushes[k, 1]:
+            force[0] += pushes[k, 2]
+            force[1] += pushes[k, 3]

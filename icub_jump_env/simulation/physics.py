@@ -33,8 +33,13 @@ class Physics:
         data: The MuJoCo data.
         joint_position: (n,) live view of the joint positions (rad).
         joint_velocity: (n,) live view of the joint velocities (rad/s).
+        control: (n,) live view of the motor torques on the joint side (Nm), which MuJoCo clamps at
+            the effort limits.
+        joint_force: (n,) live view of other torques on the joints (Nm).
         chest_force: (3,) live view of the external force on the chest's CoM (N), world axes;
             it acts until it is changed.
+        warnings: Live view of how often MuJoCo warned, by kind.
+        addresses: Of MuJoCo's model and data, for compiled code.
         evaluated_time: Time (s) for which MuJoCo last evaluated forces, sensors and all
             that depends on the state: the beginning of the last step.
     """
@@ -57,10 +62,13 @@ class Physics:
         data = self.data
         self.joint_position = data.qpos[7:]
         self.joint_velocity = data.qvel[6:]
-        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
-        self._joint_force = data.qfrc_applied[6:]
+        self._qpos, self._qvel, self.control = data.qpos, data.qvel, data.ctrl
+        self.joint_force = data.qfrc_applied[6:]
         self.chest_force = data.xfrc_applied[self.model.body(self.robot.chest_link).id, :3]
-        self._warnings = data.warning.number
+        self.warnings = data.warning.number
+        # MuJoCo names these for C code beside its bindings; see its issues 983 and 2564.
+        self.addresses = self.model._address, data._address
+        self._dt = float(self.model.opt.timestep)
         self._last_time = data.time
         self.evaluated_time = data.time
 
@@ -93,23 +101,17 @@ class Physics:
         self.data.time = self._last_time = self.evaluated_time = 0.0
         mujoco.mj_forward(self.model, self.data)
 
-    def step(self, torque: Array, friction: Array | None = None) -> None:
-        """Advance by one physics step.
-
-        Args:
-            torque: (n,) motor torques on the joint side (Nm), which MuJoCo clamps at the
-                effort limits.
-            friction: (n,) torques that joint friction takes away from them (Nm).
-        """
-        self._ctrl[:] = torque
-        if friction is not None:
-            np.negative(friction, out=self._joint_force)
-        self.evaluated_time = self.data.time
+    def step(self) -> None:
+        """Advance by one physics step."""
         mujoco.mj_step(self.model, self.data)
-        time = self.data.time
-        # Once gone backwards, the clock stays behind this mark.
-        if time > self._last_time:
-            self._last_time = time
+        self.note(1)
+
+    def note(self, steps: int) -> None:
+        """MuJoCo has taken some steps."""
+        # As MuJoCo adds up its clock.
+        for _ in range(steps):
+            self.evaluated_time = self._last_time
+            self._last_time += self._dt
 
     @property
     def diverged(self) -> bool:
@@ -118,7 +120,7 @@ class Physics:
         MuJoCo resets itself when its state becomes NaN or huge, after which everything
         is finite again; only its warnings and a clock that ran back tell.
         """
-        return self.data.time != self._last_time or bool(self._warnings.any())
+        return self.data.time != self._last_time or bool(self.warnings.any())
 
     @property
     def valid(self) -> bool:

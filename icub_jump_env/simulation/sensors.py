@@ -7,9 +7,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from icub_jump_env.estimation.readings import Readings
+from icub_jump_env.records import Array, Block
 from icub_jump_env.robot.mujoco_model import sole_geom
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import World
@@ -20,8 +20,6 @@ from icub_jump_env.simulation.sensor_models import (
     SensorConfig,
     SensorError,
 )
-
-Array = NDArray[np.float64]
 
 _VIEWS = ("_imu_rotation", "_imu_gyro", "_base_velocity", "_sole_forces", "_soles")
 
@@ -41,7 +39,6 @@ class Sensors:
     Attributes:
         readings: The latest readings, which :meth:`read` overwrites.
         encoder_bias: (n,) constant part of the encoders' error (rad).
-        biased: Whether any of it is not zero.
         torque_error: (n,) what the errors of the feet's force/torque sensors do to the
             joint torques computed from them (Nm): J^T times the wrench's error.
     """
@@ -63,7 +60,6 @@ class Sensors:
         }
         self.readings = Readings.of(n)
         self.encoder_bias, self.torque_error = np.zeros(n), np.zeros(n)
-        self.biased = False
         self._world_bias = np.zeros(n)
         self._down = np.array([0.0, 0.0, -1.0])
         self._gravity = np.zeros(3)
@@ -72,7 +68,7 @@ class Sensors:
         self._errors: dict[str, ErrorSource] = {}
         self._force_gain = np.zeros(2)
         self._wrong_forces = False
-        self._history: deque[tuple[Array, ...]] = deque(maxlen=1 + config.delay)
+        self._history: deque[Block] = deque(maxlen=1 + config.delay)
 
     def _bind(self) -> None:
         data = self._physics.data
@@ -112,7 +108,6 @@ class Sensors:
         self.encoder_bias[:] = world.encoder_bias
         if "joint_position" in self._errors:
             self.encoder_bias += self._errors["joint_position"].bias
-        self.biased = bool(self.encoder_bias.any())
         self._world_bias[:] = world.encoder_bias
         gravity = self._gravity
         gravity[:] = self._physics.model.opt.gravity
@@ -184,10 +179,8 @@ class Sensors:
             self.torque_error -= self._jacobian[:, 6:].T @ wrench
 
     def _postpone(self, readings: Readings) -> None:
-        present = [getattr(readings, name) for name in Readings.__slots__]
-        self._history.append(tuple(reading.copy() for reading in present))
-        for reading, past in zip(present, self._history[0], strict=True):
-            reading[:] = past
+        self._history.append(readings.block.copy())
+        readings.block[:] = self._history[0]
 
 
 def _cross(a: Array, b: Array) -> Array:

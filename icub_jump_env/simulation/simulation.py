@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.estimation.readings import Readings
+from icub_jump_env.metrics.series import OUTCOMES, SeriesRecorder
 from icub_jump_env.simulation.actuators.actuators import Actuators
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
-from icub_jump_env.simulation.disturbances import Disturbances
+from icub_jump_env.simulation.disturbances import Awaited, Disturbances, comes
 from icub_jump_env.simulation.ground_truth import GroundTruth
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import (
@@ -23,6 +24,14 @@ from icub_jump_env.simulation.randomization import (
 )
 from icub_jump_env.simulation.sensor_models import SensorConfig
 from icub_jump_env.simulation.sensors import Sensors
+from icub_jump_env.simulation.stepping import (
+    EVENT,
+    RUNNING,
+    after_step,
+    before_step,
+    settle,
+    take_steps,
+)
 from icub_jump_env.simulation.variation import ModelVariation
 
 Array = NDArray[np.float64]
@@ -49,6 +58,7 @@ class Simulation:
         sensors: SensorConfig,
         randomization: Randomization,
         command_delay: int,
+        compiled: bool,
     ) -> None:
         """Set up the simulation.
 
@@ -58,6 +68,7 @@ class Simulation:
             sensors: Errors of the sensors.
             randomization: What varies.
             command_delay: Control ticks until a command takes effect, beside those drawn.
+            compiled: Whether the steps of a control tick are compiled.
         """
         self.physics = physics
         self.truth = GroundTruth(physics)
@@ -70,7 +81,9 @@ class Simulation:
         self._variation = ModelVariation(physics.model, physics.robot)
         self._command_delay = command_delay
         self._pending: deque[JointCommand] = deque()
-        self._disturbances: Disturbances | None = None
+        self._disturbances: Disturbances
+        self._awaited = Awaited()
+        self._compiled = compiled
         self.world: World
 
     def reset(
@@ -101,12 +114,12 @@ class Simulation:
         self.sensors.reset(world, seed)
         physics.reset(qpos)
         self.actuators.reset(qpos[7:], torque)
-        self._disturbances = None
-        for _ in range(round(SETTLING_TIME / self._dt)):
-            self.step()
+        self._awaited = Awaited()
+        self._settle(round(SETTLING_TIME / self._dt))
         physics.start_from_rest()
         self._pending.clear()
-        self._disturbances = Disturbances.of(physics, world, launch_duration)
+        self._disturbances = Disturbances(physics, world, launch_duration)
+        self._awaited = self._disturbances.awaited
 
     def drawn(self) -> dict[str, Any]:
         """What the reset drew: ``world`` and ``sensor_errors``, plain values."""
@@ -122,20 +135,64 @@ class Simulation:
         if len(self._pending) > delay:
             self.actuators.command(self._pending.popleft())
 
-    def step(self) -> None:
-        """Advance by one physics step."""
+    def run(self, steps: int, series: SeriesRecorder) -> str:
+        """Take physics steps, no more than it takes to the end of the episode.
+
+        Args:
+            steps: How many.
+            series: Watches and judges each.
+
+        Returns:
+            The outcome of the episode; ``running`` while it has none.
+        """
+        physics, noticed, reason = self.physics, False, RUNNING
+        watching = self.truth.state.block, *series.blocks
+        while steps > 0 and reason == RUNNING:
+            taken, reason = self._take(steps, noticed, watching)
+            steps -= taken
+            noticed = reason == EVENT
+            if noticed:
+                self._disturbances.happen()
+                reason = RUNNING
+        if physics.diverged:
+            return "diverged"
+        return OUTCOMES[reason]
+
+    def _forces(self) -> tuple[Any, ...]:
         physics = self.physics
-        position = physics.joint_position
-        if self.sensors.biased:
-            position = position + self.sensors.encoder_bias
-        actuators = self.actuators
-        torque = actuators.torque(position, physics.joint_velocity)
-        if self._disturbances is not None:
-            self._disturbances.act()
-        physics.step(torque, actuators.friction)
+        return (
+            physics.joint_position, physics.joint_velocity, self.sensors.encoder_bias,
+            self.actuators.drives.block, physics.control, physics.joint_force,
+            self._awaited.block, physics.chest_force,
+        )  # fmt: skip
+
+    def _take(self, steps: int, noticed: bool, watching: tuple[Any, ...]) -> tuple[int, int]:
+        physics, sources, forces = self.physics, self.truth.sources, self._forces()
+        if self._compiled:
+            result = take_steps(
+                *physics.addresses, physics.data.time, self._dt, steps, noticed, forces,
+                physics.warnings, sources, *watching,
+            )  # fmt: skip
+            physics.note(result[0])
+            return result
+        if not noticed and comes(sources[0], self._awaited.block):
+            return 0, EVENT
+        time = physics.data.time
+        before_step(time, *forces)
+        physics.step()
+        return 1, after_step(time, physics.warnings, sources, *watching)
+
+    def _settle(self, steps: int) -> None:
+        physics, forces = self.physics, self._forces()
+        if self._compiled:
+            settle(*physics.addresses, self._dt, steps, forces)
+            return
+        for step in range(steps):
+            before_step(step * self._dt, *forces)
+            physics.step()
 
     def sense(self) -> Readings:
         """Take new readings; call once per control tick."""
         readings = self.sensors.read()
-        self.actuators.torque_error[:] = self.sensors.torque_error
+        self.actuators.drives.torque_error[:] = self.sensors.torque_error
         return readings

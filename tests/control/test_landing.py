@@ -1,7 +1,8 @@
 """The landing that catches by feedback: its balance layer, and its commands."""
 
-import dataclasses
+import copy
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from standing import ROBOT, STANCE, N
 
 from icub_jump_env.control import catching, landing
-from icub_jump_env.control.catching import Catch, lunge_momentum
+from icub_jump_env.control.catching import Catching, catch, lunge_momentum
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.landing import FeedbackLanding, HoldLanding
 from icub_jump_env.control.phases import Tick
@@ -31,25 +32,41 @@ PITCH, ROLL = (
 )
 
 
+class Balance(NamedTuple):
+    """What the balance layer decides."""
+
+    cop: float
+    pitch_momentum: float
+    lift: float
+
+
 class Stander:
     """A believed robot that stands in its landing posture, CoM over the middle of its soles."""
 
     def __init__(self):
         self.kinematics = FeetFixedKinematics(ROBOT)
         estimator = FeetFixedEstimator(self.kinematics)
-        state = estimator.estimate(Readings(ROBOT.landing.copy(), np.zeros(N)))
-        self.state = dataclasses.replace(
-            state,
-            **{f.name: np.array(getattr(state, f.name)) for f in dataclasses.fields(state)},
-        )
+        readings = Readings({"n": N}, joint_position=ROBOT.landing)
+        self.state = copy.deepcopy(estimator.estimate(readings))
         self.state.foot_force = np.full(2, WEIGHT / 2)
         self.middle = self.state.sole_position.mean(axis=0)
         self.state.com[:2] = self.middle[:2]
         self.height = self.state.com[2]
 
-    def balance(self, catch=None, com=NOTHING, away=None):
-        catch = Catch(self.kinematics, DT) if catch is None else catch
-        return catch.update(self.state, np.array(com), np.zeros(N) if away is None else away)
+    def catching(self):
+        return Catching.of(self.kinematics, DT)
+
+    def balance(self, catching=None, com=NOTHING, away=None):
+        return Balance(
+            *catch(
+                self.kinematics.block,
+                self.state.block,
+                np.array(com),
+                np.zeros(N) if away is None else away,
+                self.kinematics.chest_up(),
+                (self.catching() if catching is None else catching).block,
+            )
+        )
 
 
 @pytest.fixture
@@ -108,14 +125,14 @@ class TestCatch:
         stander.state.com_velocity[0] = catching.MOMENTUM_SHARE * 0.4 / (mass * stander.height)
         assert stander.balance().cop - FROM_ANKLE == pytest.approx(forward)
         assert forward > 0.0
-        lunging = Catch(stander.kinematics, DT)
-        lunging._rate = 2.0
+        lunging = stander.catching()
+        lunging.rate = 2.0
         stander.state.com_velocity[0] = 0.0
         stander.state.angular_momentum[1] = 2.0 * lunge_momentum(ROBOT)
         cop = stander.balance(lunging).cop - FROM_ANKLE
         # What is left is the lunge's own deceleration.
         omega = math.sqrt(9.81 / stander.height)
-        slowing = (lunging._rate - 2.0) / DT
+        slowing = (lunging.rate - 2.0) / DT
         assert slowing < 0.0
         assert cop == pytest.approx(
             -lunge_momentum(ROBOT) / (mass * stander.height * omega**2) * slowing
@@ -125,13 +142,13 @@ class TestCatch:
     def test_a_lunge_helps_where_the_cop_is_not_enough(self, stander, direction):
         """Pitching forward, the body pushes the CoM backward; and no further than allowed."""
         stander.state.com[0] += direction * 0.09
-        catch, lunge, rates = Catch(stander.kinematics, DT), 0.0, []
+        kept, lunge, rates = stander.catching(), 0.0, []
         per_joint = np.zeros(N)
         J = stander.kinematics.J_momentum[1]
         for _ in range(200):
             # A displacement with the momentum of the lunge so far.
             per_joint[12] = lunge * lunge_momentum(ROBOT) / J[12]
-            balance = stander.balance(catch, away=per_joint)
+            balance = stander.balance(kept, away=per_joint)
             rates.append(balance.pitch_momentum / lunge_momentum(ROBOT))
             lunge += DT * rates[-1]
         assert rates[5] * direction > 0.5
@@ -187,12 +204,12 @@ class TestCatch:
         assert balance.lift == pytest.approx(catching.LOAD_GAIN * more * way)
 
     def test_the_next_landing_forgets(self, stander):
-        used = Catch(stander.kinematics, DT)
+        used = stander.catching()
         stander.state.com[0] += 0.09
         for _ in range(5):
             stander.balance(used)
         stander.state.com[0] -= 0.09
-        used.start()
+        used.rate = 0.0
         assert stander.balance(used) == stander.balance()
 
     def test_a_lunge_moves_neither_com_nor_feet(self, stander):
@@ -244,8 +261,8 @@ class Lander:
             assert not tick.report.failed
             s = self.stander.state.joint_position
             moved = np.where(np.isnan(tick.command.torque), tick.command.position, s)
-            moved[PITCH] += DT * self.landing._velocity[PITCH]
-            moved[ROLL] += DT * self.landing._velocity[ROLL]
+            moved[PITCH] += DT * self.landing._terms.previous[PITCH]
+            moved[ROLL] += DT * self.landing._terms.previous[ROLL]
             self.stander.state.joint_position = moved
             self.stander.kinematics.update(moved)
             heights.append(float(self.stander.kinematics.com[2]))

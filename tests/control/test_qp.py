@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from icub_jump_env.control.qp import solvers
 from icub_jump_env.control.qp.check import check_solution
+from icub_jump_env.control.qp.equalities import EqualitySolution, solve_equalities
 from icub_jump_env.control.qp.problem import (
     IDLE,
     QPReport,
@@ -170,3 +172,59 @@ def test_the_worse_of_two_reports_is_the_failed_one_then_the_less_exact():
     failed = exact._replace(status=QPStatus.REJECTED)
     for better, bad in ((exact, rough), (rough, failed), (IDLE, exact), (exact, failed)):
         assert worse(better, bad) is worse(bad, better) is bad
+
+
+def without_active_inequalities():
+    problem = random_problem(0)
+    others = slice(problem.lower.size - problem.n_equalities)
+    problem.lower[others], problem.upper[others] = -1e6, 1e6
+    return problem
+
+
+class TestClosedForm:
+    """Where no inequality is active."""
+
+    @given(seeds, st.sampled_from([0.0, 1e-3, 0.1, 1.0]), st.integers(0, 3))
+    def test_it_is_the_solution_or_an_inequality_is_active(self, seed, pull, equalities):
+        problem = random_problem(seed, equalities=equalities)
+        problem.g *= pull
+        expected = make_solver("daqp", problem).solve()
+        found = EqualitySolution(problem)
+        inequalities = slice(problem.lower.size - equalities)
+        is_active = bool(expected.multipliers[inequalities].any())
+        assert solve_equalities(problem.block, found.block) is not is_active
+        if not is_active:
+            np.testing.assert_allclose(found.x, expected.x, atol=1e-9)
+            np.testing.assert_allclose(found.multipliers, expected.multipliers, atol=1e-8)
+
+    @pytest.mark.parametrize("field", ["H", "g", "C", "lower", "upper"])
+    def test_what_is_no_number_has_none(self, field):
+        problem = poisoned(field, np.nan)
+        assert not solve_equalities(problem.block, EqualitySolution(problem).block)
+
+    def test_what_is_not_convex_or_contradicts_itself_has_none(self):
+        concave, contradictory = poisoned("H", -1e6), random_problem(3)
+        contradictory.C[-1] = contradictory.C[-2]
+        for problem in (concave, contradictory):
+            assert not solve_equalities(problem.block, EqualitySolution(problem).block)
+
+    @pytest.mark.parametrize(("name", "iterates"), [("daqp", False), ("osqp", True)])
+    def test_it_stands_in_for_the_default_solver_alone(self, name, iterates):
+        problem = without_active_inequalities()
+        _, report = CheckedSolver(name, problem).solve()
+        assert report.status is QPStatus.SOLVED
+        assert (report.iterations > 0) is iterates
+
+    def test_what_the_check_refuses_is_solved_again(self, monkeypatch):
+        problem = without_active_inequalities()
+        expected, _ = CheckedSolver("daqp", problem).solve()
+
+        def wrong(problem, found):
+            found["x"] = expected.x + 1e-3
+            return True
+
+        monkeypatch.setattr(solvers, "solve_equalities", wrong)
+        solution, report = CheckedSolver("daqp", problem).solve()
+        assert report.status is QPStatus.SOLVED
+        assert report.iterations > 0
+        np.testing.assert_allclose(solution.x, expected.x, atol=1e-9)

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,19 +10,25 @@ from hypothesis import strategies as st
 from standing import GRAVITY, ROBOT, N, Oracle, Standing
 
 from icub_jump_env.control.config import ContactConfig
-from icub_jump_env.control.tasks.centroidal import CentroidalVelocity
-from icub_jump_env.control.tasks.com import ComAcceleration, ComVelocity
-from icub_jump_env.control.tasks.contact import ContactLimits, SmallWrenches, contact_rows
-from icub_jump_env.control.tasks.feet import FeetAcceleration, FeetVelocity, SolesApart
-from icub_jump_env.control.tasks.limits import AccelerationLimits, TorqueLimits, VelocityLimits
-from icub_jump_env.control.tasks.momentum import MomentumIntegral, MomentumRate
-from icub_jump_env.control.tasks.motion import BaseMotion
-from icub_jump_env.control.tasks.posture import PostureAcceleration, PostureVelocity
-from icub_jump_env.control.tasks.smoothness import TorqueSmoothness, VelocitySmoothness
-from icub_jump_env.control.tasks.stack import TaskQP
+from icub_jump_env.control.qp.problem import UNBOUNDED
+from icub_jump_env.control.tasks.com import com_acceleration, com_velocity
+from icub_jump_env.control.tasks.contact import contact_rows, limit_wrenches
+from icub_jump_env.control.tasks.feet import feet_acceleration, feet_velocity
+from icub_jump_env.control.tasks.least_squares import least_squares
+from icub_jump_env.control.tasks.limits import (
+    acceleration_limits,
+    torque_limits,
+    velocity_limits,
+)
+from icub_jump_env.control.tasks.momentum import momentum_integral, momentum_rate
+from icub_jump_env.control.tasks.motion import base_motion
+from icub_jump_env.control.tasks.posture import posture_acceleration, posture_velocity
+from icub_jump_env.control.tasks.smoothness import torque_smoothness, velocity_smoothness
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
+from icub_jump_env.robot.limits import JointLimits
 
 seeds = st.integers(0, 10_000)
+LIMITS = JointLimits.of(ROBOT).block[0]
 
 
 @dataclasses.dataclass
@@ -43,6 +48,9 @@ class Case:
         self.integral = 0.1 * self.rng.normal(size=3)
         self.weights = self.rng.uniform(0.5, 2.0, N)
         self.world = self.state.base_rotation
+        # What a compiled function calls the fields of a block.
+        self.model, self.motion = self.kinematics.block[0], self.dynamics.block[0]
+        self.believed, self.asked = self.state.block[0], self.wanted.block[0]
         self.errors = {
             "com": self.oracle.com - self.wanted.com_position,
             "com_velocity": self.oracle.momentum(self.state.joint_velocity)[:3] / self.oracle.mass
@@ -59,21 +67,31 @@ class Equation:
     """A task and its residual, written out in Pinocchio's terms.
 
     Attributes:
-        make: The task.
+        write: The task: case, scale, rows, target.
         residual: Its residual at joint velocities, or at accelerations and wrenches.
+        size: Number of its rows.
         n: Number of unknowns.
         world: Whether the residual is in world axes and the task in those of the base.
+        scaled: Whether it has a weight.
     """
 
-    make: Callable[[Case], Any]
+    write: Callable[..., None]
     residual: Callable[..., np.ndarray]
+    size: int = 3
     n: int = N + 12
     world: bool = False
+    scaled: bool = True
+
+    def written(self, case, scale=1.0):
+        """Rows and target, into buffers that were not clean where the task writes."""
+        rows, target = np.zeros((self.size, self.n)), np.full(self.size, 7.0)
+        self.write(case, scale, rows, target)
+        return rows, target
 
 
 EQUATIONS = {
     "(3b)": Equation(
-        lambda c: ComVelocity(c.kinematics, 7.0, 30.0),
+        lambda c, scale, *out: com_velocity(c.model, c.believed, c.asked, 7.0, scale, *out),
         lambda c, s_dot: (
             c.oracle.momentum(s_dot)[:3] / c.oracle.mass
             - (c.wanted.com_velocity - 7.0 * c.errors["com"])
@@ -81,19 +99,23 @@ EQUATIONS = {
         n=N,
     ),
     "(3d)": Equation(
-        lambda c: MomentumIntegral(c.kinematics, 9.0, 20.0, c.integral),
+        lambda c, scale, *out: momentum_integral(c.model, c.integral, c.asked, 9.0, scale, *out),
         lambda c, s_dot: (
             c.oracle.momentum(s_dot)[3:] - (c.wanted.angular_momentum - 9.0 * c.integral)
         ),
         n=N,
     ),
     "(3c)": Equation(
-        lambda c: FeetVelocity(c.kinematics),
+        lambda c, scale, *out: feet_velocity(c.model, 0.0, *out),
         lambda c, s_dot: -c.oracle.in_base_frame(c.oracle.J[1] @ c.oracle.velocity(s_dot)),
+        size=6,
         n=N,
+        scaled=False,
     ),
     "(6b)": Equation(
-        lambda c: ComAcceleration(c.dynamics, 150.0, 20.0, 40.0),
+        lambda c, scale, *out: com_acceleration(
+            c.motion, c.believed, c.asked, 150.0, 20.0, scale, *out
+        ),
         lambda c, s_ddot, f: (
             c.oracle.contact(f)[:3] / c.oracle.mass
             + GRAVITY
@@ -104,52 +126,35 @@ EQUATIONS = {
         world=True,
     ),
     "(6d)": Equation(
-        lambda c: MomentumRate(c.dynamics, 9.0, 20.0),
+        lambda c, scale, *out: momentum_rate(c.motion, c.believed, c.asked, 9.0, scale, *out),
         lambda c, s_ddot, f: (
             c.oracle.contact(f)[3:] - c.wanted.angular_momentum_rate + 9.0 * c.errors["momentum"]
         ),
         world=True,
     ),
     "(6c)": Equation(
-        lambda c: FeetAcceleration(c.kinematics, c.dynamics),
+        lambda c, scale, *out: feet_acceleration(c.model, c.motion, *out),
         lambda c, s_ddot, f: (
             -c.oracle.in_base_frame(
                 c.oracle.J[1] @ c.oracle.acceleration(s_ddot) + c.oracle.drift[1]
             )
         ),
+        size=6,
+        scaled=False,
     ),
     "base rows of (1)": Equation(
-        lambda c: BaseMotion(c.dynamics),
+        lambda c, scale, *out: base_motion(c.motion, *out),
         lambda c, s_ddot, f: c.oracle.forces(s_ddot, f)[:6],
+        size=6,
+        scaled=False,
     ),
     "second term of (6a)": Equation(
-        lambda c: TorqueSmoothness(c.dynamics, c.weights, c.previous),
+        lambda c, scale, *out: torque_smoothness(c.motion, c.previous, c.weights, *out),
         lambda c, s_ddot, f: np.sqrt(c.weights) * (c.oracle.forces(s_ddot, f)[6:] - c.previous),
+        size=N,
+        scaled=False,
     ),
 }
-
-
-class Unit:
-    """1/2 ||x||^2, which every QP needs."""
-
-    def __init__(self, n):
-        self.diagonal = np.ones(n)
-
-    def subtract(self, state, setpoint, gradient):
-        pass
-
-
-def posed(n, case, costs=(), soft=(), hard=(), limits=()):
-    qp = TaskQP(n, costs=[Unit(n), *costs], soft=soft, hard=hard, limits=limits, solver="daqp")
-    qp.pose(case.state, case.wanted)
-    return qp.problem
-
-
-def residual_of(equation, case):
-    """The oracle as a function of the unknowns."""
-    if equation.n == N:
-        return lambda x: equation.residual(case, x)
-    return lambda x: equation.residual(case, x[:N], x[N:])
 
 
 def unknowns(case, n):
@@ -160,49 +165,40 @@ def unknowns(case, n):
 
 @pytest.mark.parametrize("name", EQUATIONS)
 @settings(max_examples=5)
-@given(seeds)
-def test_a_hard_equation_is_the_papers(name, seed):
+@given(seeds, st.floats(0.1, 100.0))
+def test_an_equation_is_the_papers(name, seed, scale):
     case, equation = Case(seed), EQUATIONS[name]
-    task = equation.make(case)
-    problem = posed(equation.n, case, hard=[task])
-    np.testing.assert_array_equal(problem.lower[equation.n :], problem.upper[equation.n :])
+    rows, target = equation.written(case, scale)
+    factor = scale if equation.scaled else 1.0
     for _ in range(2):
         x = unknowns(case, equation.n)
-        ours = problem.C @ x - problem.lower[equation.n :]
-        theirs = residual_of(equation, case)(x)
-        assert task.size == len(theirs)
+        parts = (x,) if equation.n == N else (x[:N], x[N:])
+        ours, theirs = (rows @ x - target) / factor, equation.residual(case, *parts)
         if equation.world:
             ours = case.world @ ours
         np.testing.assert_allclose(ours, theirs, atol=1e-9 * max(1.0, np.abs(theirs).max()))
 
 
-@pytest.mark.parametrize("name", EQUATIONS)
-@settings(max_examples=3)
-@given(seeds)
-def test_a_soft_equation_is_its_weighted_square(name, seed):
-    """The gradient of the cost against central differences of the oracle's square."""
-    case, equation = Case(seed), EQUATIONS[name]
-    task = equation.make(case)
-    problem = posed(equation.n, case, soft=[task])
-    residual, x = residual_of(equation, case), unknowns(case, equation.n)
-    gradient = problem.H @ x + problem.g - x
-
-    def cost(x):
-        return task.weight / 2 * residual(x) @ residual(x)
-
-    # Quadratic functions have exact central differences, so that a long step loses nothing.
-    theirs = [(cost(x + step) - cost(x - step)) / 2 for step in np.eye(equation.n)]
-    np.testing.assert_allclose(gradient, theirs, atol=1e-8 * max(1.0, np.abs(theirs).max()))
+@given(st.integers(0, 12), seeds)
+def test_least_squares_are_the_square_of_their_residual(size, seed):
+    """Hessian and gradient of 1/2 ||A x - b||^2 + 1/2 x^T D x + g^T x."""
+    rng = np.random.default_rng(seed)
+    A, b, D, g = (rng.normal(size=shape) for shape in ((size, 7), size, 7, 7))
+    hessian, gradient = np.full((7, 7), 3.0), g.copy()
+    least_squares(A, b, D, hessian, gradient)
+    np.testing.assert_allclose(hessian, A.T @ A + np.diag(D), atol=1e-12)
+    np.testing.assert_allclose(gradient, g - A.T @ b, atol=1e-12)
+    np.testing.assert_array_equal(hessian, hessian.T)
 
 
 def test_the_wrenches_that_fulfil_6b_and_6d_give_the_com_and_the_momentum_these_rates():
     """Newton and Euler hold: with the base rows, forces are accelerations."""
     case = Case(1)
     names = ("(6b)", "(6d)", "(6c)", "base rows of (1)")
-    tasks = [EQUATIONS[name].make(case) for name in names]
-    problem = posed(N + 12, case, hard=tasks)
-    x = np.linalg.lstsq(problem.C, problem.lower[N + 12 :])[0]
-    np.testing.assert_allclose(problem.C @ x, problem.lower[N + 12 :], atol=1e-8)
+    written = [EQUATIONS[name].written(case) for name in names]
+    rows, target = (np.concatenate(parts) for parts in zip(*written, strict=True))
+    x = np.linalg.lstsq(rows, target)[0]
+    np.testing.assert_allclose(rows @ x, target, atol=1e-8)
     step, oracle, R = 1e-5, case.oracle, case.wanted
     # One step of the joints on either side, with the feet where they are.
     s, s_dot = case.state.joint_position.copy(), case.state.joint_velocity.copy()
@@ -220,33 +216,23 @@ def test_the_wrenches_that_fulfil_6b_and_6d_give_the_com_and_the_momentum_these_
 
 COSTS = {
     "first term of (3a)": (
-        lambda c: PostureVelocity(2.0, c.weights),
-        lambda c, x: c.weights * (x - c.wanted.posture_velocity + 2.0 * c.errors["posture"]),
-        N,
+        lambda c, g: posture_velocity(c.believed, c.asked, 2.0, c.weights, g),
+        lambda c: c.weights * (-c.wanted.posture_velocity + 2.0 * c.errors["posture"]),
     ),
     "second term of (3a)": (
-        lambda c: VelocitySmoothness(c.weights, c.previous),
-        lambda c, x: c.weights * (x - c.previous),
-        N,
+        lambda c, g: velocity_smoothness(c.previous, c.weights, g),
+        lambda c: c.weights * -c.previous,
     ),
     "first term of (6a)": (
-        lambda c: PostureAcceleration(12.0, 5.0, c.weights),
-        lambda c, x: np.append(
+        lambda c, g: posture_acceleration(c.believed, c.asked, 12.0, 5.0, c.weights, g),
+        lambda c: (
             c.weights
             * (
-                x[:N]
-                - c.wanted.posture_acceleration
+                -c.wanted.posture_acceleration
                 + 12.0 * c.errors["posture"]
                 + 5.0 * c.errors["posture_velocity"]
-            ),
-            np.zeros(12),
+            )
         ),
-        N + 12,
-    ),
-    "wrenches": (
-        lambda c: SmallWrenches(0.3, N),
-        lambda c, x: np.append(np.zeros(N), 0.3 * x[N:]),
-        N + 12,
     ),
 }
 
@@ -255,45 +241,13 @@ COSTS = {
 @given(seeds)
 @settings(max_examples=5)
 def test_a_cost_pulls_towards_its_goal(name, seed):
+    """Its gradient where the unknowns are zero, added to what was there."""
     case = Case(seed)
-    make, gradient, n = COSTS[name]
-    problem, x = posed(n, case, costs=[make(case)]), unknowns(case, n)
-    np.testing.assert_allclose(problem.H @ x + problem.g - x, gradient(case, x), atol=1e-9)
-
-
-def test_terms_add_up():
-    """Costs, soft equations and the order of the rows, all in one QP."""
-    case = Case(2)
-    names = ("(6b)", "(6d)")
-    together = posed(
-        N + 12, case,
-        costs=[COSTS[name][0](case) for name in ("first term of (6a)", "wrenches")],
-        soft=[EQUATIONS[name].make(case) for name in names],
-        limits=[TorqueLimits(case.dynamics, ROBOT), ContactLimits(ContactConfig(), ROBOT)],
-        hard=[EQUATIONS[name].make(case) for name in ("(6c)", "base rows of (1)")],
-    )  # fmt: skip
-    single = [
-        *(posed(N + 12, case, costs=[COSTS[n][0](case)]) for n in ("first term of (6a)", "wrenches")),
-        *(posed(N + 12, case, soft=[EQUATIONS[name].make(case)]) for name in names),
-    ]  # fmt: skip
-    eye = np.eye(N + 12)
-    scale = np.abs(together.H).max()
-    np.testing.assert_allclose(
-        together.H - eye, sum(p.H - eye for p in single), atol=1e-12 * scale
-    )
-    np.testing.assert_allclose(together.g, sum(p.g for p in single), rtol=1e-9, atol=1e-9)
-    rows = [
-        posed(N + 12, case, limits=[TorqueLimits(case.dynamics, ROBOT)]),
-        posed(N + 12, case, limits=[ContactLimits(ContactConfig(), ROBOT)]),
-        *(posed(N + 12, case, hard=[EQUATIONS[n].make(case)]) for n in ("(6c)", "base rows of (1)")),
-    ]  # fmt: skip
-    np.testing.assert_array_equal(together.C, np.vstack([p.C for p in rows]))
-    for end in ("lower", "upper"):
-        ours = getattr(together, end)[N + 12 :]
-        np.testing.assert_array_equal(
-            ours, np.concatenate([getattr(p, end)[N + 12 :] for p in rows])
-        )
-    assert together.n_equalities == 12
+    subtract, expected = COSTS[name]
+    before = case.rng.normal(size=N)
+    gradient = before.copy()
+    subtract(case, gradient)
+    np.testing.assert_allclose(gradient - before, expected(case), atol=1e-9)
 
 
 class TestLimits:
@@ -302,20 +256,18 @@ class TestLimits:
         case = Case(seed)
         rng = case.rng
         limit = np.where(rng.random(N) < 0.5, ROBOT.lower_position, ROBOT.upper_position)
-        case.state.joint_position = limit + rng.uniform(-0.1, 0.1, N)
-        case.state.joint_velocity = ROBOT.velocity_limit * rng.uniform(-1.1, 1.1, N)
+        case.state.joint_position[:] = limit + rng.uniform(-0.1, 0.1, N)
+        case.state.joint_velocity[:] = ROBOT.velocity_limit * rng.uniform(-1.1, 1.1, N)
         return case
 
     @given(seeds)
     @settings(max_examples=10)
     def test_velocities_end_where_the_speed_or_the_position_after_the_horizon_does(self, seed):
         case, horizon = self.extreme(seed), 0.02
-        problem = posed(N, case, limits=[VelocityLimits(ROBOT, horizon, 0.9)])
+        lower, upper = np.zeros((2, N))
+        velocity_limits(LIMITS, case.believed, horizon, 0.9, lower, upper)
         fastest = 0.9 * ROBOT.velocity_limit
-        for bound, limit in (
-            (problem.lower, ROBOT.lower_position),
-            (problem.upper, ROBOT.upper_position),
-        ):
+        for bound, limit in ((lower, ROBOT.lower_position), (upper, ROBOT.upper_position)):
             to_the_limit = (limit - case.state.joint_position) / horizon
             expected = np.clip(to_the_limit, -fastest, fastest)
             np.testing.assert_allclose(bound, expected, atol=1e-9)
@@ -327,12 +279,12 @@ class TestLimits:
     def test_accelerations_lead_to_the_limits_after_the_horizons(self, seed):
         """Uniformly accelerated: s + h s_dot + h^2/2 s_ddot is at its limit, or the speed is."""
         case, speed_horizon, horizon = self.extreme(seed), 0.005, 0.02
-        limits = AccelerationLimits(ROBOT, speed_horizon, horizon)
-        problem = posed(N + 12, case, limits=[limits])
+        lower, upper = np.zeros((2, N))
+        acceleration_limits(LIMITS, case.believed, speed_horizon, horizon, lower, upper)
         s, s_dot = case.state.joint_position, case.state.joint_velocity
         for bound, limit, side in (
-            (problem.lower[:N], ROBOT.lower_position, -1.0),
-            (problem.upper[:N], ROBOT.upper_position, 1.0),
+            (lower, ROBOT.lower_position, -1.0),
+            (upper, ROBOT.upper_position, 1.0),
         ):
             position = s + horizon * s_dot + horizon**2 / 2 * bound
             speed = s_dot + speed_horizon * bound
@@ -348,65 +300,33 @@ class TestLimits:
 
     def test_torques_are_bounded_in_both_directions(self):
         case = Case(0)
-        problem = posed(N + 12, case, limits=[TorqueLimits(case.dynamics, ROBOT)])
+        rows, (lower, upper) = np.zeros((N, N + 12)), np.zeros((2, N))
+        torque_limits(LIMITS, case.motion, rows, lower, upper)
         x = unknowns(case, N + 12)
         torque = case.oracle.forces(x[:N], x[N:])[6:]
-        slack = problem.upper[N + 12 :] - problem.C @ x, problem.C @ x - problem.lower[N + 12 :]
-        np.testing.assert_allclose(slack[0], ROBOT.effort_limit - torque, atol=1e-8)
-        np.testing.assert_allclose(slack[1], ROBOT.effort_limit + torque, atol=1e-8)
+        np.testing.assert_allclose(upper - rows @ x, ROBOT.effort_limit - torque, atol=1e-8)
+        np.testing.assert_allclose(rows @ x - lower, ROBOT.effort_limit + torque, atol=1e-8)
 
     def test_each_foot_has_its_cone_and_least_force(self):
-        case, config = Case(0), ContactConfig(minimum_force=17.0)
-        problem = posed(N + 12, case, limits=[ContactLimits(config, ROBOT)])
-        cone, x = contact_rows(config, ROBOT.sole), unknowns(case, N + 12)
-        left, right = x[N : N + 6], x[N + 6 :]
-        np.testing.assert_allclose(problem.C @ x, np.concatenate((cone @ left, cone @ right)))
-        assert not problem.upper[N + 12 :].any()
-        assert (problem.lower[N + 12 :] < -1e5).all()
-        normal = np.zeros(N + 12, dtype=bool)
-        normal[[N + 2, N + 8]] = True
-        assert (problem.lower[: N + 12][normal] == 17.0).all()
-        assert (problem.lower[: N + 12][~normal] < -1e5).all()
-        assert (problem.upper[: N + 12] > 1e5).all()
-
-
-def test_with_its_residual_unknown_an_equation_is_soft():
-    """The same solution as that of (3b) and (3d) without feedback as costs."""
-    case = Case(2)
-    kinematics, posture = case.kinematics, PostureVelocity(2.0, case.weights)
-    centroidal, apart = CentroidalVelocity(kinematics, 30.0, 20.0), SolesApart(kinematics)
-    momentum = MomentumIntegral(kinematics, 0.0, 20.0, np.zeros(3))
-    soft = TaskQP(
-        N,
-        costs=[posture],
-        soft=[ComVelocity(kinematics, 0.0, 30.0), momentum],
-        hard=[apart],
-        limits=[],
-        solver="daqp",
-    )
-    residual_unknown = TaskQP(
-        N + 6,
-        costs=[posture, centroidal],
-        soft=[],
-        hard=[centroidal, apart],
-        limits=[],
-        solver="daqp",
-    )
-    expected, x = (qp.solve(case.state, case.wanted)[0].x for qp in (soft, residual_unknown))
-    np.testing.assert_allclose(x[:N], expected, atol=1e-9)
-    wanted = np.concatenate((case.wanted.com_velocity, case.wanted.angular_momentum))
-    np.testing.assert_allclose(x[N:], wanted - kinematics.centroidal_map @ expected, atol=1e-9)
-    assert np.abs(x[N:]).max() > 1e-3
+        config, f = ContactConfig(minimum_force=17.0), np.random.default_rng(0).normal(size=12)
+        rows, (lower, upper), least = np.zeros((20, 12)), np.ones((2, 20)), np.full(12, -1.0)
+        limit_wrenches(config, ROBOT.sole, rows, lower, upper, least)
+        cone = contact_rows(config, ROBOT.sole)
+        np.testing.assert_allclose(rows @ f, np.concatenate((cone @ f[:6], cone @ f[6:])))
+        assert not upper.any()
+        assert (lower == -UNBOUNDED).all()
+        normal = np.zeros(12, dtype=bool)
+        normal[[2, 8]] = True
+        assert (least[normal] == 17.0).all()
+        assert (least[~normal] == -1.0).all()
 
 
 @pytest.mark.parametrize("speed", [-0.2, 0.0, 0.3])
 def test_soles_go_apart_along_the_vertical_alone(speed):
     """Twists of both soles from Pinocchio, for joint velocities that fulfil the equation."""
     case = Case(3)
-    task = SolesApart(case.kinematics)
-    task.speed = speed
     rows, target = np.zeros((6, N)), np.zeros(6)
-    task.write(case.state, case.wanted, rows, target)
+    feet_velocity(case.model, speed, rows, target)
     s_dot = np.linalg.lstsq(rows, target, rcond=None)[0]
     oracle = case.oracle
     nu = np.concatenate((np.zeros(6), s_dot))

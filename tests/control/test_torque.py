@@ -118,7 +118,7 @@ def textbook(case, previous):
     problem.H[:], problem.g[:] = H, g
     lower, upper = problem.lower, problem.upper
     lower[:N], upper[:N] = -ROBOT.effort_limit, ROBOT.effort_limit
-    lower[N:], upper[N : N + 12] = -1e6, 1e6
+    upper[N + 12 : N + 12 + 2 * len(cone)] = 0.0
     for foot in range(2):
         wrench = slice(N + 6 * foot, N + 6 * foot + 6)
         lower[wrench.start + 2] = contact.minimum_force

@@ -207,8 +207,9 @@ def test_a_wrong_number_of_weights_is_refused(field):
 
 
 def script(subject, *answers):
-    """Put words into the mouth of the controller's solver."""
+    """Put words into the mouth of the controller's solver, which has all the QPs."""
     checked = subject.qp._solver
+    checked._closed = None
     checked._solver = Scripted(checked._solver, answers)
 
 

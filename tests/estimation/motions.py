@@ -1,5 +1,6 @@
 """Readings of made-up motions and of recorded jumps, with what is true of them."""
 
+import copy
 import dataclasses
 import math
 
@@ -50,6 +51,7 @@ class MadeUp:
         omega = pin.log3(self.base(t - e)[0].T @ self.base(t + e)[0]) / (2 * e)
         specific = (self.velocity(t) - self.velocity(t - dt)) / dt - 9.81 * self.down
         return Readings(
+            {"n": ROBOT.n_joints},
             joint_position=self.posture(t),
             joint_velocity=(self.posture(t + e) - self.posture(t - e)) / (2 * e),
             gravity=TO_IMU @ R.T @ self.down,
@@ -151,8 +153,8 @@ class Recorded:
         truth = Truth(env.model)
 
         def keep(readings):
-            copies = {n: getattr(readings, n).copy() for n in Readings.__slots__}
-            self.ticks.append(Tick(env.data.time, Readings(**copies), truth.read(env.data)))
+            kept = copy.deepcopy(readings)
+            self.ticks.append(Tick(env.data.time, kept, truth.read(env.data)))
 
         env.watch = keep
         env.reset(seed=seed)
@@ -167,9 +169,7 @@ class Recorded:
         """Each tick with a copy of what an estimator believes."""
         estimator = estimator or ImuEstimator(FeetFixedKinematics(ROBOT), self.dt)
         for tick in self.ticks:
-            state = estimator.estimate(tick.readings)
-            copies = (np.copy(getattr(state, field.name)) for field in dataclasses.fields(state))
-            yield tick, type(state)(*copies)
+            yield tick, copy.deepcopy(estimator.estimate(tick.readings))
 
     def flight(self, estimator=None):
         """Those in the air."""

@@ -96,7 +96,7 @@ class TestOnTheFeet:
     def test_a_drift_of_the_position_is_taken_back(self):
         ours = estimator()
         feed(ours, REST, ticks(0.1))
-        ours._base_position += [0.01, 0.02, 0.03]
+        ours._memory.base_position += [0.01, 0.02, 0.03]
         state = feed(ours, REST, ticks(0.4))
         np.testing.assert_allclose(state.com, REST.momentum(0.0)[0], atol=1e-6)
 
@@ -104,12 +104,12 @@ class TestOnTheFeet:
         ours = estimator()
         feed(ours, REST, ticks(0.1))
         for force, load in ((BOTH, 1.0), ((0.1 * WEIGHT, 0.1 * WEIGHT), 0.5)):
-            ours._base_velocity[:] = 1.0, 0.0, 0.0
-            ours._base_position[:] = ours_at_rest = P0.copy()
+            ours._memory.base_velocity[:] = 1.0, 0.0, 0.0
+            ours._memory.base_position[:] = ours_at_rest = P0.copy()
             state = ours.estimate(REST.readings(0.0, force))
             left = math.exp(-imu.CONTACT_GAIN * load * DT)
             assert state.com_velocity[0] == pytest.approx(left, abs=1e-9)
-            moved = ours._base_position[0] - ours_at_rest[0]
+            moved = ours._memory.base_position[0] - ours_at_rest[0]
             assert moved == pytest.approx(left * DT, abs=1e-9)
             assert state.sole_position[0, 0] == pytest.approx(ROBOT.sole.center_x + moved)
 
@@ -223,8 +223,8 @@ class TestInTheAir:
         motion, ours = MadeUp(lambda t: ROBOT.crouch, base), estimator()
         feed(ours, motion, ticks(0.3), NONE)
         t = 0.3 - DT
-        np.testing.assert_allclose(ours._base_velocity, motion.velocity(t), atol=2e-3)
-        np.testing.assert_allclose(ours._base_position, base(t)[1], atol=5e-4)
+        np.testing.assert_allclose(ours._memory.base_velocity, motion.velocity(t), atol=2e-3)
+        np.testing.assert_allclose(ours._memory.base_position, base(t)[1], atol=5e-4)
         np.testing.assert_allclose(ours._state.base_rotation, base(t)[0], atol=2e-5)
 
     def test_a_made_up_flight_is_followed(self):
@@ -298,7 +298,7 @@ class TestInTheAir:
         feed(ours, REST, ticks(0.1))
         feed(ours, thrown(), [0.0], NONE)
         before = ours._state.com_velocity.copy(), ours._state.angular_momentum.copy()
-        ours._base_velocity[:] = 1.0, 0.0, 0.0
+        ours._memory.base_velocity[:] = 1.0, 0.0, 0.0
         readings = thrown().readings(0.1, NONE)
         readings.gyro[:] = 0.0, 0.1, 0.0
         state = ours.estimate(readings)

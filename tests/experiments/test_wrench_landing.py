@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments import wrench_landing
-from experiments.wrench_controller import SolesDamped, WrenchGains, WrenchLanding
+from experiments.wrench_controller import WrenchGains, WrenchLanding, soles_damped
 from experiments.wrench_landing import (
     HARDEST,
     PARTS,
@@ -21,7 +21,6 @@ from icub_jump_env.control.qp.problem import IDLE, QPStatus
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
-from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import load_robot
@@ -109,11 +108,10 @@ def test_a_motion_of_the_soles_relative_to_each_other_is_taken_off(weight):
     kinematics.update(s)
     dynamics = FeetFixedDynamics(kinematics)
     dynamics.update(s, s_dot)
-    task = SolesDamped(kinematics, dynamics, 30.0, weight)
-    task.scale, task.speed = np.sqrt(weight), 0.2
-    state = RobotState(s, s_dot, *[None] * 8)
+    state = RobotState({"n": 23}, joint_position=s, joint_velocity=s_dot)
     rows, target = np.zeros((6, 35)), np.zeros(6)
-    task.write(state, Setpoint.at_rest(s), rows, target)
+    blocks = (part.block[0] for part in (kinematics, dynamics, state))
+    soles_damped(*blocks, 0.2, 30.0, np.sqrt(weight), rows, target)
     s_ddot = np.linalg.lstsq(rows[:, :23], target, rcond=None)[0]
     # From now until the next tick, left minus right: its error from the wanted speed shrinks.
     wanted = np.zeros(6)
@@ -132,7 +130,8 @@ def test_without_a_solution_the_torques_fade():
     before = landing.torque.copy()
     assert not held.report.failed
     assert np.abs(before).max() > 1.0
-    landing._wrench_qp.solve = lambda *_: (None, IDLE._replace(status=QPStatus.INFEASIBLE))
+    failed = IDLE._replace(status=QPStatus.INFEASIBLE)
+    landing._wrench_solver.solve = lambda: (None, failed)
     failed = landing.tick(env._state, 0.005, np.zeros(3))
     assert failed.report.failed
     np.testing.assert_allclose(landing.torque, 0.9 * before)

@@ -1,13 +1,12 @@
 """The set point in the world: a plan from where the robot stands, plus the residual."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.planning.reference import Reference
 from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.robot.statics import Stance
 
 START = np.array([0.02, 0.001, 0.39])
 ADDED = {"com_position": "offset", "com_velocity": "velocity", "com_acceleration": "acceleration"}
@@ -17,13 +16,13 @@ class Moving:
     """A plan of which every part moves, each entry at a rate of its own."""
 
     duration, displacement, landing_posture = 0.4, 0.1, np.zeros(5)
+    stance = Stance(np.zeros(5), np.zeros(12), np.zeros(5))
 
     def __init__(self):
         self._setpoint = Setpoint.at_rest(np.zeros(5))
 
     def sample(self, time):
-        for count, field in enumerate(dataclasses.fields(Setpoint), start=1):
-            part = getattr(self._setpoint, field.name)
+        for count, part in enumerate(parts(self._setpoint).values(), start=1):
             part[:] = count + time * np.arange(1, len(part) + 1)
         return self._setpoint
 
@@ -36,7 +35,7 @@ def reference():
 
 
 def parts(setpoint):
-    return {field.name: getattr(setpoint, field.name) for field in dataclasses.fields(Setpoint)}
+    return {name: getattr(setpoint, name) for name in setpoint.block.dtype.names}
 
 
 @pytest.mark.parametrize("time", [0.0, 0.3])

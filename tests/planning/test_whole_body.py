@@ -34,7 +34,7 @@ def plan_of(name, height):
 
 
 def copies(setpoint):
-    return {f.name: getattr(setpoint, f.name).copy() for f in dataclasses.fields(setpoint)}
+    return {name: setpoint.block[name][0].copy() for name in setpoint.block.dtype.names}
 
 
 commands = st.tuples(st.sampled_from(sorted(FAMILIES)), st.floats(0.02, 0.07), st.floats(0.0, 1.0))

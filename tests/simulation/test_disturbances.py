@@ -16,12 +16,8 @@ from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.robot.frames import mujoco_qpos
 from icub_jump_env.robot.mujoco_model import BLOCK_GEOMS, FLOOR_GEOM, sole_geom
 from icub_jump_env.robot.robot import load_robot
-from icub_jump_env.simulation.disturbances import (
-    PUSH_DURATION,
-    Disturbances,
-    Stage,
-    ground_rotation,
-)
+from icub_jump_env.simulation import disturbances
+from icub_jump_env.simulation.disturbances import PUSH_DURATION, Disturbances, ground_rotation
 from icub_jump_env.simulation.ground_truth import GroundTruth
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import RANDOMIZATIONS, Randomization, draw_world
@@ -46,20 +42,24 @@ class Throw:
         self.disturbances = Disturbances(self.physics, world, launch_duration=0.43)
 
     def step(self):
-        self.disturbances.act()
-        q, v = self.physics.joint_position, self.physics.joint_velocity
-        self.physics.step(1500.0 * (CROUCH[7:] - q) - 50.0 * v)
+        physics, awaited = self.physics, self.disturbances.awaited.block
+        if disturbances.comes(physics.data.sensordata, awaited):
+            self.disturbances.happen()
+        disturbances.push(physics.data.time, awaited, physics.chest_force)
+        q, v = physics.joint_position, physics.joint_velocity
+        physics.control[:] = 1500.0 * (CROUCH[7:] - q) - 50.0 * v
+        physics.step()
         return self.truth.read()
 
     def until(self, stage):
         for _ in range(300):
-            if self.disturbances._stage is stage:
+            if self.disturbances.awaited.stage == stage:
                 return
             self.step()
         raise AssertionError(stage)
 
     def land(self, steps=300):
-        self.until(Stage.NONE)
+        self.until(disturbances.NONE)
         for _ in range(steps):
             self.step()
         return self.truth.state
@@ -77,7 +77,11 @@ class TestPushes:
         world = {kind: impulse, f"{kind}_direction": direction, f"{kind}_time": delay}
         if kind == "push":
             world["push_time"] = delay / (0.43 - PUSH_DURATION)
-        event = {"push": Stage.LIFT_OFF, "flight_push": Stage.APEX, "landing_push": Stage.NONE}
+        event = {
+            "push": disturbances.LIFT_OFF,
+            "flight_push": disturbances.APEX,
+            "landing_push": disturbances.NONE,
+        }
         calm, pushed = Throw(takeoff_spin=1e-9), Throw(takeoff_spin=1e-9, **world)
         for throw in (calm, pushed):
             throw.until(event[kind])
@@ -115,7 +119,7 @@ class TestSpin:
     def test_it_turns_the_robot_as_a_whole_about_its_com(self):
         calm, spun = Throw(floor_tilt=1e-9), Throw(takeoff_spin=1.5)
         for throw in (calm, spun):
-            throw.until(Stage.APEX)
+            throw.until(disturbances.APEX)
         before, after = calm.truth.state, spun.truth.state
         gained = after.angular_momentum - before.angular_momentum
         np.testing.assert_allclose(gained, before.locked_inertia @ [0, 1.5, 0], atol=1e-9)
@@ -136,13 +140,17 @@ class TestSpin:
 
     def test_chatter_is_no_lift_off(self):
         throw = Throw(takeoff_spin=1.0)
-        watch = throw.disturbances._watch
+        awaited, sensed = throw.disturbances.awaited, np.zeros(len(throw.physics.data.sensordata))
+
+        def comes(force, rise):
+            sensed[[int(awaited.ground_force), int(awaited.rise)]] = force, rise
+            return disturbances.comes(sensed, awaited.block)
+
         for force, rise, steps in ((0.0, 1.0, 4), (1.0, 1.0, 1), (0.9, 1.0, 4), (0.0, -0.1, 1)):
-            for _ in range(steps):
-                watch(force, rise)
+            assert not any(comes(force, rise) for _ in range(steps))
+        assert [comes(0.9, 0.1) for _ in range(5)] == [False] * 4 + [True]
         assert not throw.physics.data.qvel[3:].any()
-        for _ in range(5):
-            watch(0.9, 0.1)
+        throw.disturbances.happen()
         assert throw.physics.data.qvel[3:].any()
 
 
@@ -150,7 +158,7 @@ class TestFloor:
     @pytest.mark.parametrize(("tilt", "lateral"), [(0.03, 0.0), (0.0, -0.04), (-0.03, 0.02)])
     def test_soles_stand_on_the_tilted_plane(self, tilt, lateral):
         throw = Throw(floor_tilt=tilt, floor_tilt_lateral=lateral)
-        throw.until(Stage.TOUCHDOWN)
+        throw.until(disturbances.TOUCHDOWN)
         pivot = sum(throw.truth.state.sole_position) / 2 * [1, 1, 0]
         state = throw.land(steps=1200)
         normal = ground_rotation(tilt, lateral).apply([0.0, 0.0, 1.0])
@@ -173,7 +181,7 @@ class TestFloor:
     def test_nothing_changes_before_the_apex(self):
         throw = Throw(floor_tilt=0.05, step=0.01)
         model, fresh = throw.physics.model, Physics(ROBOT, 0.001, blocks=True).model
-        throw.until(Stage.APEX)
+        throw.until(disturbances.APEX)
         np.testing.assert_array_equal(model.geom_pos, fresh.geom_pos)
         assert model.opt.disableflags == fresh.opt.disableflags
 
@@ -215,7 +223,7 @@ class TestBlocks:
     @pytest.mark.parametrize(("edge", "step"), [(0.006, 0.0), (-0.006, 0.0), (0.004, 0.004)])
     def test_the_edge_begins_ahead_of_or_behind_the_middle_of_the_left_sole(self, edge, step):
         throw = Throw(edge=edge, step=step)
-        throw.until(Stage.TOUCHDOWN)
+        throw.until(disturbances.TOUCHDOWN)
         middle = throw.truth.state.sole_position[0][0]
         seen, data = [], throw.physics.data
         for _ in range(100):
@@ -264,8 +272,10 @@ EVERYTHING = JumpConfig.of(
 
 
 class TestEpisodes:
-    def test_an_undisturbed_world_pays_nothing(self):
-        assert Disturbances.of(Physics(ROBOT, 0.001), NOMINAL, 0.43) is None
+    def test_nothing_is_awaited_in_an_undisturbed_world(self):
+        awaited = Disturbances(Physics(ROBOT, 0.001), NOMINAL, 0.43).awaited
+        assert awaited.stage == disturbances.NONE
+        assert not awaited.pushes.any()
 
     def test_copies_go_on_with_the_same_bits_and_so_does_the_next_episode(self):
         """Copies are taken while the robot rises, falls and stands."""
@@ -279,14 +289,14 @@ class TestEpisodes:
         np.testing.assert_array_equal(*starts)
         copies = []
         for steps, stage, copier in (
-            (0, Stage.APEX, copy.deepcopy),
-            (9, Stage.TOUCHDOWN, lambda env: pickle.loads(pickle.dumps(env))),
-            (11, Stage.NONE, copy.deepcopy),
+            (0, disturbances.APEX, copy.deepcopy),
+            (9, disturbances.TOUCHDOWN, lambda env: pickle.loads(pickle.dumps(env))),
+            (11, disturbances.NONE, copy.deepcopy),
         ):
             for twin in (env, *copies):
                 for _ in range(steps):
                     twin.step(ZERO)
-            assert env._simulation._disturbances._stage is stage
+            assert env._simulation._disturbances.awaited.stage == stage
             copies.append(copier(env))
         for _ in range(15):
             results = [twin.step(ZERO) for twin in (env, *copies)]

@@ -37,7 +37,7 @@ def test_ground_truth_against_pinocchio(physics, seed):
     thrown(physics, seed)
     truth = GroundTruth(physics)
     qpos, qvel = physics.data.qpos.copy(), physics.data.qvel.copy()
-    physics.step(zeros)
+    physics.step()
     state = truth.read()
 
     model = build_pinocchio_model(ROBOT)
@@ -70,7 +70,7 @@ def test_ground_truth_against_pinocchio(physics, seed):
 
 def test_chest_is_upright_in_the_straight_posture(physics):
     physics.reset(np.concatenate(([0, 0, 1.0, 0, 0, 0, 1], zeros)))
-    physics.step(zeros)
+    physics.step()
     state = GroundTruth(physics).read()
     assert state.chest_tilt == pytest.approx(0.0, abs=1e-3)
     assert state.base_pitch == pytest.approx(0.0, abs=1e-3)
@@ -83,7 +83,7 @@ def test_positive_base_pitch_leans_forward(physics):
     quaternion = np.zeros(4)
     mujoco.mju_mulQuat(quaternion, pitch, yaw)
     physics.reset(np.concatenate(([0, 0, 1.0], quaternion, zeros)))
-    physics.step(zeros)
+    physics.step()
     assert GroundTruth(physics).read().base_pitch == pytest.approx(0.2, abs=1e-3)
     head, base = (physics.data.body(name).xpos[0] for name in ("head", ROBOT.base_link))
     assert head > base
@@ -107,11 +107,12 @@ def test_momentum_is_conserved_in_the_air(physics):
     thrown(physics)
     truth = GroundTruth(physics)
     rng = np.random.default_rng(1)
-    physics.step(zeros)
+    physics.step()
     start = truth.read()
     momentum, velocity, time = start.angular_momentum.copy(), start.com_velocity.copy(), start.time
     for _ in range(200):
-        physics.step(0.3 * ROBOT.effort_limit * rng.normal(size=ROBOT.n_joints))
+        physics.control[:] = 0.3 * ROBOT.effort_limit * rng.normal(size=ROBOT.n_joints)
+        physics.step()
     state = truth.read()
     assert state.ground_force == 0.0
     np.testing.assert_allclose(state.angular_momentum, momentum, atol=0.02)
@@ -125,7 +126,8 @@ def test_a_fallen_robot_stays_on_the_floor(physics, seed):
     truth = GroundTruth(physics)
     touched = False
     for _ in range(3000):
-        physics.step(-2.0 * np.array(physics.joint_velocity))
+        physics.control[:] = -2.0 * physics.joint_velocity
+        physics.step()
         touched |= not truth.read().only_feet_touch
     assert touched
     assert not physics.diverged
@@ -138,7 +140,7 @@ def test_soles_collide_with_the_floor_and_no_link_with_another(physics):
     thrown(physics, 3, height=0.6)
     floor = physics.model.geom("floor").id
     for _ in range(1000):
-        physics.step(zeros)
+        physics.step()
         pairs |= {tuple(pair) for pair in physics.data.contact.geom}
     assert pairs
     assert all(floor in pair for pair in pairs)
@@ -150,14 +152,14 @@ def test_divergence_is_noticed_though_mujoco_resets_itself(physics, field, poiso
     thrown(physics)
     assert not physics.diverged
     getattr(physics.data, field)[10] = poison
-    physics.step(zeros)
+    physics.step()
     assert np.isfinite(physics.data.qpos).all()
     assert physics.diverged
 
 
 def test_reset_clears_divergence(physics):
     physics.data.qvel[3] = np.nan
-    physics.step(zeros)
+    physics.step()
     thrown(physics)
-    physics.step(zeros)
+    physics.step()
     assert not physics.diverged

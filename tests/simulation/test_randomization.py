@@ -280,7 +280,7 @@ class TestModel:
             physics.reset(np.concatenate(([0, 0, 0.45, 0, 0, 0, 1], ROBOT.crouch)))
             soles = {model.geom(f"{side}_sole_contact").id for side in "lr"}
             for _ in range(300):
-                physics.step(np.zeros(ROBOT.n_joints))
+                physics.step()
                 pairs = [c for c in physics.data.contact if soles & set(c.geom)]
                 if pairs:
                     break

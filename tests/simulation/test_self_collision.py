@@ -73,7 +73,8 @@ def test_contacts_keep_arms_out_of_thighs(self_collision):
     target = floating(**CLASPED)[7:]
     for _ in range(400):
         error = target - physics.joint_position
-        physics.step(30.0 * error - 2.0 * physics.joint_velocity)
+        physics.control[:] = 30.0 * error - 2.0 * physics.joint_velocity
+        physics.step()
     depth = shapes.overlap(physics.data.qpos)
     assert (depth < TOLERANCE) if self_collision else (depth > 0.01)
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from icub_jump_env.compiled import compiled
 from icub_jump_env.control.qp.problem import QPResiduals, QPSolution, QuadraticProgram
-
-Array = NDArray[np.float64]
-
-_largest = np.maximum.reduce
-"""As ``ndarray.max``, without its detour through Python."""
+from icub_jump_env.linear_algebra import larger
+from icub_jump_env.records import Array, Block
 
 
 def check_solution(problem: QuadraticProgram, solution: QPSolution) -> QPResiduals:
@@ -23,18 +20,35 @@ def check_solution(problem: QuadraticProgram, solution: QPSolution) -> QPResidua
     Returns:
         The residuals.
     """
-    n, g, x, multipliers = problem.n, problem.g, solution.x, solution.multipliers
-    values = np.concatenate((x, problem.C.dot(x)))
-    below, above = problem.lower - values, values - problem.upper
-    primal = max(_largest(below), _largest(above))
+    return QPResiduals(*residuals(problem.block, solution.x, solution.multipliers))
 
-    stationarity = problem.H.dot(x)
-    stationarity += g
-    stationarity += multipliers[:n]
-    stationarity += multipliers[n:].dot(problem.C)
-    dual = _largest(np.abs(stationarity)) / (1.0 + _largest(np.abs(g)))
 
-    # At the optimum each multiplier's bound is active; a wrong sign shows here.
-    slack = np.where(multipliers > 0, above, below)
-    gap = np.abs(multipliers).dot(np.abs(slack)) / (1.0 + abs(g.dot(x)))
-    return QPResiduals(max(float(primal), 0.0), float(dual), float(gap))
+@compiled
+def residuals(problem: Block, x: Array, multipliers: Array) -> tuple[float, float, float]:
+    """The same of plain arrays: primal, dual and gap of :class:`QPResiduals`."""
+    p = problem[0]
+    n, m = p.g.shape[0], p.C.shape[0]
+    slope = np.empty(n)
+    primal = gap = cost = steepest = dual = 0.0
+    for j in range(n):
+        slope[j] = p.g[j] + multipliers[j]
+        cost += p.g[j] * x[j]
+        steepest = larger(steepest, abs(p.g[j]))
+    for i in range(n):
+        for j in range(n):
+            slope[j] += x[i] * p.H[i, j]
+    for row in range(n + m):
+        value = 0.0
+        if row < n:
+            value = x[row]
+        else:
+            for j in range(n):
+                value += p.C[row - n, j] * x[j]
+                slope[j] += multipliers[row] * p.C[row - n, j]
+        below, above = p.lower[row] - value, value - p.upper[row]
+        primal = larger(primal, larger(below, above))
+        # At the optimum each multiplier's bound is active; a wrong sign shows here.
+        gap += abs(multipliers[row]) * abs(above if multipliers[row] > 0.0 else below)
+    for j in range(n):
+        dual = larger(dual, abs(slope[j]))
+    return primal, dual / (1.0 + steepest), gap / (1.0 + abs(cost))

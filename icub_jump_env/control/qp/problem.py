@@ -11,36 +11,41 @@ upper bounds are equal is an equality.
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, Record
+
+UNBOUNDED = 1e6
+"""Stands for infinity in bounds, which OSQP and DAQP take as any number."""
 
 
-class QuadraticProgram:
+class QuadraticProgram(Record):
     """Buffers of one QP of fixed size, rewritten in place at each control tick.
 
     Attributes:
-        n: Number of variables.
         H: (n, n) Hessian, positive definite.
         g: (n,) gradient.
         C: (m, n) constraint rows.
         lower: (n + m,) lower bounds of x, then of C x.
         upper: (n + m,) upper bounds.
+        n: Number of variables.
         n_equalities: The last ``n_equalities`` rows of C are equalities.
     """
 
+    H: Annotated[Array, ("n", "n")]
+    g: Annotated[Array, ("n",)]
+    C: Annotated[Array, ("m", "n")]
+    lower: Annotated[Array, ("n + m",)]
+    upper: Annotated[Array, ("n + m",)]
+
     def __init__(self, n_variables: int, n_inequalities: int, n_equalities: int) -> None:
         n, m = n_variables, n_inequalities + n_equalities
-        self.H = np.eye(n)
-        self.g = np.zeros(n)
-        self.C = np.zeros((m, n))
-        self.lower = np.zeros(n + m)
-        self.upper = np.zeros(n + m)
-        self.n = n
-        self.n_equalities = n_equalities
+        super().__init__({"n": n, "m": m, "n + m": n + m}, H=np.eye(n))
+        self.lower[: n + n_inequalities] = -UNBOUNDED
+        self.upper[: n + n_inequalities] = UNBOUNDED
+        self.n, self.n_equalities = n, n_equalities
 
 
 class QPStatus(StrEnum):

@@ -1,1 +1,1 @@
-"""The equations of the paper's controllers, one class each, and how they become a QP."""
+"""The equations of the paper's controllers, one function each, and how costs become a QP."""

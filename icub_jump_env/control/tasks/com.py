@@ -1,69 +1,82 @@
-"""The CoM task: (3b) in velocities, (6b) in accelerations."""
+"""The CoM task: (3b) in velocities, (6b) in accelerations.
+
+Like all equations of this package each is a compiled function that writes its rows A and its right
+side b into buffers of the QP, both times ``scale``: 1 for a constraint, the root of its weight for
+a cost.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.planning.plan import Setpoint
-from icub_jump_env.robot.dynamics import GRAVITY, FeetFixedDynamics
-from icub_jump_env.robot.kinematics import FeetFixedKinematics
-
-Array = NDArray[np.float64]
+from icub_jump_env.compiled import compiled
+from icub_jump_env.linear_algebra import rotate_back
+from icub_jump_env.records import Array, Block
+from icub_jump_env.robot.icub import GRAVITY
 
 
-class ComVelocity:
-    """J_c nu = x_dot_dc - K (x - x_dc), eq. (3b)."""
+@compiled
+def com_velocity(
+    model: Block,
+    state: Block,
+    setpoint: Block,
+    gain: float,
+    scale: float,
+    rows: Array,
+    target: Array,
+) -> None:
+    """J_c nu = x_dot_dc - K (x - x_dc), eq. (3b).
 
-    size = 3
+    Args:
+        model: Kinematics of both feet at rest.
+        state: The believed state.
+        setpoint: What to track.
+        gain: K (1/s).
+        scale: Root of the weight (s/m).
+        rows: (3, n) A, of the joint velocities.
+        target: (3,) b.
+    """
+    for i in range(3):
+        error = state.com[i] - setpoint.com_position[i]
+        target[i] = scale * (setpoint.com_velocity[i] - gain * error)
+        for j in range(rows.shape[1]):
+            rows[i, j] = scale * model.centroidal_map[i, j]
 
-    def __init__(self, kinematics: FeetFixedKinematics, gain: float, weight: float) -> None:
-        """Set up the task: ``gain`` is K (1/s), ``weight`` in (m/s)^-2."""
-        self._kinematics, self._gain = kinematics, gain
-        self.weight, self.scale = weight, 1.0
 
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation."""
-        np.multiply(self._kinematics.J_com, self.scale, out=rows)
-        error = state.com - setpoint.com_position
-        error *= self._gain
-        np.subtract(setpoint.com_velocity, error, out=target)
-        target *= self.scale
-
-
-class ComAcceleration:
+@compiled
+def com_acceleration(
+    dynamics: Block,
+    state: Block,
+    setpoint: Block,
+    stiffness: float,
+    damping: float,
+    scale: float,
+    rows: Array,
+    target: Array,
+) -> None:
     """J_c nu_dot + J_c_dot nu = x_ddot_dc - [K_p K_d] (x - x_dc, x_dot - x_dot_dc), eq. (6b).
 
     By Newton's law it reads F / m + g = x_ddot for the total contact force F, which makes it
     rows on the contact wrenches alone, here in the axes of the base. The paper prints the
     gains as diag(K_p, K_d), which would return six numbers for three.
+
+    Args:
+        dynamics: Equations of motion.
+        state: The believed state.
+        setpoint: What to track.
+        stiffness: K_p (1/s^2).
+        damping: K_d (1/s).
+        scale: Root of the weight (s^2/m).
+        rows: (3, n + 12) A, of joint accelerations and contact wrenches.
+        target: (3,) b.
     """
-
-    size = 3
-
-    def __init__(
-        self, dynamics: FeetFixedDynamics, stiffness: float, damping: float, weight: float
-    ) -> None:
-        """Set up the task.
-
-        Args:
-            dynamics: Equations of motion, up to date when the task is written.
-            stiffness: K_p (1/s^2).
-            damping: K_d (1/s).
-            weight: Weight of the residual ((m/s^2)^-2).
-        """
-        self._dynamics = dynamics
-        self._stiffness, self._damping = stiffness, damping
-        self.weight, self.scale = weight, 1.0
-
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation."""
-        dynamics = self._dynamics
-        per_mass = self.scale / dynamics.mass
-        np.multiply(dynamics.force_rows, per_mass, out=rows[:, -12:])
-        wanted = setpoint.com_acceleration - GRAVITY
-        wanted -= self._stiffness * (state.com - setpoint.com_position)
-        wanted -= self._damping * (state.com_velocity - setpoint.com_velocity)
-        np.dot(wanted, state.base_rotation, out=target)
-        target *= per_mass * dynamics.mass
+    first = rows.shape[1] - 12
+    wanted = np.empty(3)
+    for i in range(3):
+        error = state.com[i] - setpoint.com_position[i]
+        rate = state.com_velocity[i] - setpoint.com_velocity[i]
+        wanted[i] = scale * (setpoint.com_acceleration[i] - stiffness * error - damping * rate)
+        for j in range(12):
+            rows[i, first + j] = scale / dynamics.total_mass * dynamics.force_rows[i, j]
+    wanted[2] += scale * GRAVITY
+    rotate_back(state.base_rotation, wanted, target)

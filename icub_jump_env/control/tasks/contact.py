@@ -3,50 +3,33 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from icub_jump_env.control.config import ContactConfig
-from icub_jump_env.control.tasks.task import Limit, LimitBuffers
-from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.planning.plan import Setpoint
+from icub_jump_env.control.qp.problem import UNBOUNDED
+from icub_jump_env.records import Array
 from icub_jump_env.robot.icub import Sole
-from icub_jump_env.robot.robot import Robot
 
 
-class ContactLimits(Limit):
-    """C u <= b for both feet, eq. (6f), with a least normal force."""
+def limit_wrenches(
+    config: ContactConfig, sole: Sole, rows: Array, lower: Array, upper: Array, least: Array
+) -> None:
+    """C u <= b for both feet, eq. (6f), with a least normal force; it never changes.
 
-    size = 20
-
-    def __init__(self, config: ContactConfig, robot: Robot) -> None:
-        self._cone = contact_rows(config, robot.sole)
-        self._minimum_force = config.minimum_force
-
-    def prepare(self, buffers: LimitBuffers) -> None:
-        """Write the rows and bounds of the wrenches, the last 12 unknowns."""
-        for foot in range(2):
-            rows = slice(10 * foot, 10 * foot + 10)
-            first = buffers.rows.shape[1] - 12 + 6 * foot
-            buffers.rows[rows, first : first + 6] = self._cone
-        buffers.rows_upper[:] = 0.0
-        buffers.lower[[-10, -4]] = self._minimum_force
-
-
-class SmallWrenches:
-    """1/2 w ||f||^2: makes the distribution of the contact wrenches over the feet unique."""
-
-    def __init__(self, weight: float, n_joints: int) -> None:
-        """Set up the task; the unknowns are n joint accelerations, then 12 wrench entries."""
-        self.diagonal = np.zeros(n_joints + 12)
-        self.diagonal[n_joints:] = weight
-
-    def subtract(
-        self, state: RobotState, setpoint: Setpoint, gradient: NDArray[np.float64]
-    ) -> None:
-        """Nothing: the goal is zero."""
+    Args:
+        config: Friction, torsion, least force.
+        sole: Shape of the soles.
+        rows: (20, 12) of the wrenches of both feet.
+        lower: (20,) bounds of these rows.
+        upper: (20,)
+        least: (12,) lower bounds of the wrenches themselves.
+    """
+    cone = contact_rows(config, sole)
+    rows[:10, :6] = rows[10:, 6:] = cone
+    lower[:], upper[:] = -UNBOUNDED, 0.0
+    least[[2, 8]] = config.minimum_force
 
 
-def contact_rows(config: ContactConfig, sole: Sole) -> NDArray[np.float64]:
+def contact_rows(config: ContactConfig, sole: Sole) -> Array:
     """Rows of C f <= 0 for the wrench f = (force, moment) in a sole frame.
 
     The friction cone is a pyramid with sides along x and y. The moment is about the

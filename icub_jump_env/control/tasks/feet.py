@@ -6,57 +6,37 @@ relative to it.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.planning.plan import Setpoint
-from icub_jump_env.robot.dynamics import FeetFixedDynamics
-from icub_jump_env.robot.kinematics import FeetFixedKinematics
-
-Array = NDArray[np.float64]
+from icub_jump_env.compiled import compiled
+from icub_jump_env.records import Array, Block
 
 
-class FeetVelocity:
-    """J_lf nu = J_rf nu = 0, eq. (3c)."""
+@compiled
+def feet_velocity(model: Block, lift: float, rows: Array, target: Array) -> None:
+    """J_lf nu = J_rf nu = 0, eq. (3c); or the right sole rises, relative to the left one.
 
-    size = 6
-    weight = scale = 1.0
-
-    def __init__(self, kinematics: FeetFixedKinematics) -> None:
-        self._kinematics = kinematics
-
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation; its right side stays zero."""
-        rows[:] = self._kinematics.J_feet
-
-
-class SolesApart(FeetVelocity):
-    """J_rf nu - J_lf nu is a vertical speed: the right sole rises, relative to the left one.
-
-    Attributes:
-        speed: That speed (m/s).
+    Args:
+        model: Kinematics of both feet at rest.
+        lift: Vertical speed of the right sole, relative to the left one (m/s).
+        rows: (6, n) A, of the joint velocities: left foot minus right foot, base axes.
+        target: (6,) b.
     """
-
-    speed = 0.0
-
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation; its rows have the left foot minus the right one, base axes."""
-        J_feet = self._kinematics.J_feet
-        rows[:, : J_feet.shape[1]] = J_feet
-        np.multiply(self._kinematics.base_rotation[2], -self.speed, out=target[:3])
+    for i in range(6):
+        target[i] = -lift * model.base_rotation[2, i] if i < 3 else 0.0
+        for j in range(model.J_feet.shape[1]):
+            rows[i, j] = model.J_feet[i, j]
 
 
-class FeetAcceleration:
-    """J_lf nu_dot + J_lf_dot nu = 0 and the same of the right foot, eq. (6c)."""
+@compiled
+def feet_acceleration(model: Block, dynamics: Block, rows: Array, target: Array) -> None:
+    """J_lf nu_dot + J_lf_dot nu = 0 and the same of the right foot, eq. (6c).
 
-    size = 6
-    weight = scale = 1.0
-
-    def __init__(self, kinematics: FeetFixedKinematics, dynamics: FeetFixedDynamics) -> None:
-        self._kinematics, self._dynamics = kinematics, dynamics
-
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation."""
-        rows[:, :-12] = self._kinematics.J_feet
-        target[:] = self._dynamics.foot_bias
+    Args:
+        model: Kinematics of both feet at rest.
+        dynamics: Equations of motion.
+        rows: (6, n + 12) A, of joint accelerations and contact wrenches.
+        target: (6,) b.
+    """
+    for i in range(6):
+        target[i] = dynamics.foot_bias[i]
+        for j in range(model.J_feet.shape[1]):
+            rows[i, j] = model.J_feet[i, j]

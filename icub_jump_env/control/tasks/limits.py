@@ -2,89 +2,77 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from icub_jump_env.control.tasks.task import Limit, LimitBuffers
-from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.robot.dynamics import FeetFixedDynamics
-from icub_jump_env.robot.robot import Robot
-
-Array = NDArray[np.float64]
+from icub_jump_env.compiled import compiled
+from icub_jump_env.records import Array, Block
 
 
-class VelocityLimits(Limit):
+@compiled
+def velocity_limits(
+    limits: Block, state: Block, horizon: float, margin: float, lower: Array, upper: Array
+) -> None:
     """s_dot^- <= s_dot <= s_dot^+ and s^- <= s + T s_dot <= s^+, eq. (3e).
 
     The paper takes one control period for the horizon T, in which no joint can stop.
+
+    Args:
+        limits: Of the robot's joints.
+        state: The believed state.
+        horizon: T (s).
+        margin: Share of the speed limits that may be used.
+        lower: (n,) bounds of the joint velocities.
+        upper: (n,)
     """
-
-    def __init__(self, robot: Robot, horizon: float, margin: float) -> None:
-        """Set up the limit.
-
-        Args:
-            robot: Whose limits they are.
-            horizon: T (s).
-            margin: Share of the speed limits that may be used.
-        """
-        self._fastest = robot.velocity_limit * margin
-        self._slowest = -self._fastest
-        self._horizon, self._n = horizon, robot.n_joints
-        self._lowest = robot.lower_position / horizon
-        self._highest = robot.upper_position / horizon
-
-    def write(self, state: RobotState, buffers: LimitBuffers) -> None:
-        """Write the bounds of the joint velocities."""
-        rate = state.joint_position / self._horizon
-        for limit, bound in (
-            (self._lowest, buffers.lower[: self._n]),
-            (self._highest, buffers.upper[: self._n]),
-        ):
-            np.subtract(limit, rate, out=bound)
-            np.minimum(bound, self._fastest, out=bound)
-            np.maximum(bound, self._slowest, out=bound)
+    for j in range(limits.speed.shape[0]):
+        fastest, s = margin * limits.speed[j], state.joint_position[j]
+        lower[j] = max(min((limits.lower[j] - s) / horizon, fastest), -fastest)
+        upper[j] = max(min((limits.upper[j] - s) / horizon, fastest), -fastest)
 
 
-class AccelerationLimits(Limit):
+@compiled
+def acceleration_limits(
+    limits: Block,
+    state: Block,
+    speed_horizon: float,
+    position_horizon: float,
+    lower: Array,
+    upper: Array,
+) -> None:
     """s_dot^- <= s_dot <= s_dot^+, s^- <= s <= s^+ after a horizon each, eq. (6e).
 
     At the decided s_ddot the speed after its horizon, and s + T s_dot + T^2/2 s_ddot, are
     within their limits; where both cannot be, the speed is.
+
+    Args:
+        limits: Of the robot's joints.
+        state: The believed state.
+        speed_horizon: s.
+        position_horizon: T (s).
+        lower: (n,) bounds of the joint accelerations.
+        upper: (n,)
     """
-
-    def __init__(self, robot: Robot, speed_horizon: float, position_horizon: float) -> None:
-        """Set up the limit; horizons in s."""
-        self._robot = robot
-        self._speed_horizon, self._horizon = speed_horizon, position_horizon
-        self._per_acceleration = 2.0 / position_horizon**2
-
-    def write(self, state: RobotState, buffers: LimitBuffers) -> None:
-        """Write the bounds of the joint accelerations."""
-        robot, s_dot = self._robot, state.joint_velocity
-        n = len(s_dot)
-        drift = state.joint_position + self._horizon * s_dot
-        slowest = (-robot.velocity_limit - s_dot) / self._speed_horizon
-        fastest = (robot.velocity_limit - s_dot) / self._speed_horizon
-        for limit, bound in (
-            (robot.lower_position, buffers.lower[:n]),
-            (robot.upper_position, buffers.upper[:n]),
-        ):
-            np.multiply(limit - drift, self._per_acceleration, out=bound)
-            np.maximum(bound, slowest, out=bound)
-            np.minimum(bound, fastest, out=bound)
+    per_acceleration = 2.0 / position_horizon**2
+    for j in range(limits.speed.shape[0]):
+        rate = state.joint_velocity[j]
+        drift = state.joint_position[j] + position_horizon * rate
+        slowest = (-limits.speed[j] - rate) / speed_horizon
+        fastest = (limits.speed[j] - rate) / speed_horizon
+        lower[j] = min(max((limits.lower[j] - drift) * per_acceleration, slowest), fastest)
+        upper[j] = min(max((limits.upper[j] - drift) * per_acceleration, slowest), fastest)
 
 
-class TorqueLimits(Limit):
-    """tau^- <= tau <= tau^+, eq. (6e)."""
+@compiled
+def torque_limits(limits: Block, dynamics: Block, rows: Array, lower: Array, upper: Array) -> None:
+    """tau^- <= tau <= tau^+, eq. (6e).
 
-    def __init__(self, dynamics: FeetFixedDynamics, robot: Robot) -> None:
-        self.size = robot.n_joints
-        self._dynamics = dynamics
-        self._highest, self._lowest = robot.effort_limit, -robot.effort_limit
-
-    def write(self, state: RobotState, buffers: LimitBuffers) -> None:
-        """Write tau(x) and its bounds."""
-        dynamics = self._dynamics
-        buffers.rows[:] = dynamics.torque_rows
-        np.subtract(self._lowest, dynamics.torque_bias, out=buffers.rows_lower)
-        np.subtract(self._highest, dynamics.torque_bias, out=buffers.rows_upper)
+    Args:
+        limits: Of the robot's joints.
+        dynamics: Equations of motion.
+        rows: (n, n + 12) map from the unknowns to tau, without its bias.
+        lower: (n,) bounds of these rows.
+        upper: (n,)
+    """
+    for i in range(limits.torque.shape[0]):
+        lower[i] = -limits.torque[i] - dynamics.torque_bias[i]
+        upper[i] = limits.torque[i] - dynamics.torque_bias[i]
+        for j in range(rows.shape[1]):
+            rows[i, j] = dynamics.torque_rows[i, j]

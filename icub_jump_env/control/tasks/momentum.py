@@ -3,60 +3,67 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.planning.plan import Setpoint
-from icub_jump_env.robot.dynamics import FeetFixedDynamics
-from icub_jump_env.robot.kinematics import FeetFixedKinematics
-
-Array = NDArray[np.float64]
+from icub_jump_env.compiled import compiled
+from icub_jump_env.linear_algebra import rotate_back
+from icub_jump_env.records import Array, Block
 
 
-class MomentumIntegral:
-    """J_M^omega nu = H_d - K int (H_omega - H_d) dt, eq. (3d); the paper's H_d is zero."""
+@compiled
+def momentum_integral(
+    model: Block,
+    integral: Array,
+    setpoint: Block,
+    gain: float,
+    scale: float,
+    rows: Array,
+    target: Array,
+) -> None:
+    """J_M^omega nu = H_d - K int (H_omega - H_d) dt, eq. (3d); the paper's H_d is zero.
 
-    size = 3
-
-    def __init__(
-        self, kinematics: FeetFixedKinematics, gain: float, weight: float, integral: Array
-    ) -> None:
-        """Set up the task.
-
-        Args:
-            kinematics: The model, up to date when the task is written.
-            gain: K (1/s).
-            weight: Weight of the residual ((kg m^2/s)^-2).
-            integral: (3,) live view of the integral, which the controller sums up.
-        """
-        self._kinematics, self._gain, self._integral = kinematics, gain, integral
-        self.weight, self.scale = weight, 1.0
-
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation."""
-        np.multiply(self._kinematics.J_momentum, self.scale, out=rows)
-        np.multiply(self._integral, -self._gain, out=target)
-        target += setpoint.angular_momentum
-        target *= self.scale
+    Args:
+        model: Kinematics of both feet at rest.
+        integral: (3,) the integral, which the controller sums up.
+        setpoint: What to track.
+        gain: K (1/s).
+        scale: Root of the weight (s/(kg m^2)).
+        rows: (3, n) A, of the joint velocities.
+        target: (3,) b.
+    """
+    for i in range(3):
+        target[i] = scale * (setpoint.angular_momentum[i] - gain * integral[i])
+        for j in range(rows.shape[1]):
+            rows[i, j] = scale * model.centroidal_map[3 + i, j]
 
 
-class MomentumRate:
+@compiled
+def momentum_rate(
+    dynamics: Block,
+    state: Block,
+    setpoint: Block,
+    gain: float,
+    scale: float,
+    rows: Array,
+    target: Array,
+) -> None:
     """A f = H_dot_d - K (H_omega - H_d), eq. (6d); the paper's H_d is zero.
 
     A f is the moment of the contact wrenches about the CoM, here in the axes of the base.
+
+    Args:
+        dynamics: Equations of motion.
+        state: The believed state.
+        setpoint: What to track.
+        gain: K (1/s).
+        scale: Root of the weight (Nm^-1).
+        rows: (3, n + 12) A, of joint accelerations and contact wrenches.
+        target: (3,) b.
     """
-
-    size = 3
-
-    def __init__(self, dynamics: FeetFixedDynamics, gain: float, weight: float) -> None:
-        """Set up the task: ``gain`` is K (1/s), ``weight`` in Nm^-2."""
-        self._dynamics, self._gain = dynamics, gain
-        self.weight, self.scale = weight, 1.0
-
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation."""
-        np.multiply(self._dynamics.moment_rows, self.scale, out=rows[:, -12:])
-        wanted = setpoint.angular_momentum - state.angular_momentum
-        np.dot(wanted, state.base_rotation, out=target)
-        target *= self.scale * self._gain
-        target += np.dot(setpoint.angular_momentum_rate, state.base_rotation) * self.scale
+    first = rows.shape[1] - 12
+    wanted = np.empty(3)
+    for i in range(3):
+        error = state.angular_momentum[i] - setpoint.angular_momentum[i]
+        wanted[i] = scale * (setpoint.angular_momentum_rate[i] - gain * error)
+        for j in range(12):
+            rows[i, first + j] = scale * dynamics.moment_rows[i, j]
+    rotate_back(state.base_rotation, wanted, target)

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.planning.plan import Setpoint
-from icub_jump_env.robot.dynamics import FeetFixedDynamics
-
-Array = NDArray[np.float64]
+from icub_jump_env.compiled import compiled
+from icub_jump_env.records import Array, Block
 
 
-class BaseMotion:
-    """The rows of M nu_dot + h = B tau + J_f f that no motor drives."""
+@compiled
+def base_motion(dynamics: Block, rows: Array, target: Array) -> None:
+    """The rows of M nu_dot + h = B tau + J_f f that no motor drives.
 
-    size = 6
-    weight = scale = 1.0
-
-    def __init__(self, dynamics: FeetFixedDynamics) -> None:
-        self._dynamics = dynamics
-
-    def write(self, state: RobotState, setpoint: Setpoint, rows: Array, target: Array) -> None:
-        """Write the equation."""
-        rows[:] = self._dynamics.base_rows
-        target[:] = self._dynamics.base_bias
+    Args:
+        dynamics: Equations of motion.
+        rows: (6, n + 12) A, of joint accelerations and contact wrenches.
+        target: (6,) b.
+    """
+    for i in range(6):
+        target[i] = dynamics.base_bias[i]
+        for j in range(rows.shape[1]):
+            rows[i, j] = dynamics.base_rows[i, j]

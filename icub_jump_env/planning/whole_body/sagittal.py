@@ -17,7 +17,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from icub_jump_env.robot import icub
-from icub_jump_env.robot.dynamics import GRAVITY
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import Robot
 
@@ -27,6 +26,8 @@ COORDINATES = ("ankle_pitch", "knee", "hip_pitch", "torso_pitch", "shoulder_pitc
 """The coordinates: joints of both sides, and the torso."""
 
 ANKLE, KNEE, HIP, TORSO, SHOULDER, ELBOW = range(len(COORDINATES))
+
+_GRAVITY = np.array([0.0, 0.0, -icub.GRAVITY])
 
 
 def selection(robot: Robot) -> Array:
@@ -189,7 +190,7 @@ class SagittalModel:
             velocities.append(body.velocity + ca.cross(body.spin, arm))
             spins.append(body.spin)
             inertias.append(rotational)
-            forces.append(inertia.mass * (acceleration - GRAVITY))
+            forces.append(inertia.mass * (acceleration - _GRAVITY))
             angular = rotational @ body.spin
             moments.append(rotational @ body.spin_rate + ca.cross(body.spin, angular))
         bodies = list(zip(masses, centers, velocities, inertias, spins, strict=True))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import math
 
+import numpy as np
+
+from icub_jump_env.compiled import compiled
 from icub_jump_env.control.command import JointCommand
+from icub_jump_env.records import Array, Block
 from icub_jump_env.robot.robot import Robot
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
-from icub_jump_env.simulation.actuators.servo import JointServo
-
-Array = NDArray[np.float64]
+from icub_jump_env.simulation.actuators.drives import Drives
+from icub_jump_env.simulation.actuators.motors import limited
+from icub_jump_env.simulation.actuators.servo import servo_torque
+from icub_jump_env.simulation.actuators.torque_loops import loop_torque
 
 FRICTION_SPEED = 0.05
 """Speed (rad/s) over which Coulomb friction builds up: tanh(s_dot / this). Ours: as small as
@@ -21,10 +25,7 @@ class Actuators:
     """Servo or torque loop, then the motor's limits, then friction.
 
     Attributes:
-        friction: (n,) torques that friction takes away (Nm); ``None`` without friction.
-        velocity_command: (n,) latest commanded joint velocities (rad/s).
-        torque_command: (n,) latest commanded torques (Nm); NaN unless in torque control.
-        torque_error: (n,) error of the torque measurement (Nm), set by whoever senses.
+        drives: What they are and their state.
     """
 
     def __init__(
@@ -44,69 +45,80 @@ class Actuators:
             strength: (n,) share of their largest torque that the motors reach.
             gain_scale: (n,) factor on the servo gains.
         """
-        n = robot.n_joints
-        self._servo = JointServo(dt, config.servo, gain_scale, robot.effort_limit)
-        self._loop = config.torque_loop.make(dt, n)
-        self._motor = config.motor.make(robot, strength)
-        self._coulomb = config.friction * robot.effort_limit
-        self._losses = np.zeros(n)
-        self.friction = self._losses if config.friction > 0.0 else None
-        self._joint_torque = np.zeros(n)
-        self._torque_control = False
-        self._servoed = np.ones(n, dtype=bool)
-        self._mixed = False
-        self.velocity_command = np.zeros(n)
-        self.torque_command = np.full(n, np.nan)
-        self.torque_error = np.zeros(n)
+        loop = config.torque_loop.parameters(dt)
+        stiffness = config.servo.stiffness * gain_scale
+        effort, stall, droop = config.motor.limits(robot, strength)
+        self.drives = Drives(
+            {"n": robot.n_joints, "k": loop.delay + 1},
+            dt=dt,
+            stiffness=stiffness,
+            damping=config.servo.damping * gain_scale,
+            largest_error=robot.effort_limit / stiffness,
+            loop_gain=loop.loop_gain,
+            loop_measures=loop.loop_measures,
+            friction_compensation=loop.friction_compensation,
+            torque_constant=loop.torque_constant,
+            coulomb=config.friction * robot.effort_limit,
+            effort=effort,
+            stall=stall,
+            droop=droop,
+            torque_command=np.nan,
+        )
+        self._servoed = np.ones(robot.n_joints, dtype=bool)
 
     def reset(self, joint_position: Array, torque: Array) -> None:
         """Hold ``joint_position`` ((n,) rad) with ``torque`` ((n,) Nm)."""
-        self._servo.reset(joint_position, torque)
-        self._joint_torque[:] = torque
-        self._torque_control = self._mixed = False
+        drives = self.drives
+        drives.reference[:] = joint_position + torque / drives.stiffness
+        drives.joint_torque[:] = torque
+        drives.torque_control = 0.0
         self._servoed[:] = True
-        self.velocity_command[:] = 0.0
-        self.torque_command[:] = np.nan
-        self.torque_error[:] = 0.0
+        drives.velocity_command[:] = 0.0
+        drives.torque_command[:] = np.nan
+        drives.torque_error[:] = 0.0
 
     def command(self, command: JointCommand) -> None:
         """Take a new command."""
-        self._torque_control = command.torque is not None
-        self.torque_command[:] = np.nan if command.torque is None else command.torque
-        servoed = np.isnan(self.torque_command)
-        if self._torque_control and (servoed != self._servoed).any():
-            self._loop.reset(self._joint_torque)
+        drives = self.drives
+        torque_control = command.torque is not None
+        drives.torque_control = float(torque_control)
+        drives.torque_command[:] = np.nan if command.torque is None else command.torque
+        servoed = np.isnan(drives.torque_command)
+        if torque_control and (servoed != self._servoed).any():
+            drives.loop_torque[:] = drives.joint_torque
+            drives.measured[:] = drives.joint_torque
         self._servoed = servoed
-        self._mixed = self._torque_control and bool(servoed.any())
-        self.velocity_command[:] = 0.0 if command.velocity is None else command.velocity
+        drives.velocity_command[:] = 0.0 if command.velocity is None else command.velocity
         if command.position is not None:
-            self._servo.move_to(command.position)
+            drives.reference[:] = command.position
 
-    def torque(self, joint_position: Array, joint_velocity: Array) -> Array:
-        """Advance by one physics step.
 
-        Args:
-            joint_position: (n,) as the servos' encoders show it (rad).
-            joint_velocity: (n,) rad/s.
+@compiled
+def actuate(position: Array, velocity: Array, drives: Block, torque: Array) -> None:
+    """Advance the actuators by one physics step.
 
-        Returns:
-            (n,) motor torques on the joint side (Nm), from which ``friction`` goes off; a
-            buffer that the next call overwrites.
-        """
-        if self.friction is not None:
-            np.multiply(self._coulomb, np.tanh(joint_velocity / FRICTION_SPEED), out=self.friction)
-        if self._torque_control:
-            measured = self._joint_torque + self.torque_error
-            wanted = self.torque_command
-            if self._mixed:
-                # The loops of joints under the servo have nothing to do.
-                wanted = np.where(self._servoed, measured, wanted)
-            motor = self._loop.motor_torque(wanted, measured, self._losses)
-            if self._mixed:
-                servo = self._servo.torque(self.velocity_command, joint_position, joint_velocity)
-                motor = np.where(self._servoed, servo, motor)
+    Args:
+        position: (n,) as the servos' encoders show it (rad).
+        velocity: (n,) rad/s.
+        drives: Block of the :class:`Drives`.
+        torque: (n,) motor torques on the joint side (Nm), which this fills.
+    """
+    d = drives[0]
+    n, k = d.measured.shape[1], d.measured.shape[0]
+    oldest = int(d.oldest)
+    if d.torque_control:
+        # The newest measurement replaces the oldest, and is it if there is no delay.
+        for j in range(n):
+            d.measured[oldest, j] = d.joint_torque[j] + d.torque_error[j]
+        oldest = (oldest + 1) % k
+        d.oldest = oldest
+    for j in range(n):
+        if d.coulomb[j] > 0.0:
+            d.friction[j] = d.coulomb[j] * math.tanh(velocity[j] / FRICTION_SPEED)
+        if d.torque_control and not math.isnan(d.torque_command[j]):
+            motor = limited(d, j, loop_torque(d, j, d.measured[oldest, j]), velocity[j])
+            d.loop_torque[j] = motor
         else:
-            motor = self._servo.torque(self.velocity_command, joint_position, joint_velocity)
-        self._motor.limit(motor, joint_velocity)
-        np.subtract(motor, self._losses, out=self._joint_torque)
-        return motor
+            motor = limited(d, j, servo_torque(d, j, position[j], velocity[j]), velocity[j])
+        torque[j] = motor
+        d.joint_torque[j] = motor - d.friction[j]

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Literal, NamedTuple
 
 from icub_jump_env.checks import check_choice, check_number, store
+from icub_jump_env.compiled import compiled
+from icub_jump_env.records import Array, Block
 from icub_jump_env.robot.icub import SPEED_TOLERANCE
 from icub_jump_env.robot.robot import Robot
 
-Array = NDArray[np.float64]
 
+class MotorLimits(NamedTuple):
+    """Limits of the motors as :class:`icub_jump_env.simulation.actuators.drives.Drives` has them.
 
-class Motor(Protocol):
-    """Limits torques to what the motors can give."""
+    Attributes:
+        effort: (n,) Nm.
+        stall: (n,) Nm.
+        droop: (n,) Nm s/rad.
+    """
 
-    def limit(self, torque: Array, joint_velocity: Array) -> None:
-        """Clip (n,) joint-side motor torques (Nm) in place, at (n,) rad/s."""
-        ...
+    effort: Array
+    stall: Array
+    droop: Array
 
 
 @dataclass(frozen=True)
@@ -48,10 +51,10 @@ class RatedMotor:
             ),
         )
 
-    def make(self, robot: Robot, strength: Array) -> Motor:
-        """The motors; ``strength`` is the (n,) share of their largest torque that they reach."""
+    def limits(self, robot: Robot, strength: Array) -> MotorLimits:
+        """Of motors that reach the (n,) share ``strength`` of their largest torque."""
         slope = 1.0 / (self.speed_band * robot.velocity_limit)
-        return _TorqueSpeedLine(
+        return MotorLimits(
             effort=robot.effort_limit * strength,
             stall=robot.effort_limit * strength * (1.0 + 1.0 / self.speed_band),
             droop=robot.effort_limit * strength * slope,
@@ -96,26 +99,22 @@ class DCMotor:
         ):
             store(self, **{name: check_number(name, getattr(self, name), low, high, unit)})
 
-    def make(self, robot: Robot, strength: Array) -> Motor:
-        """The motors; ``strength`` is the (n,) share of their largest torque that they reach."""
+    def limits(self, robot: Robot, strength: Array) -> MotorLimits:
+        """Of motors that reach the (n,) share ``strength`` of their largest torque."""
         effort = robot.effort_limit * strength
         stall = self.stall_torque * effort
-        return _TorqueSpeedLine(
+        return MotorLimits(
             effort=self.current_limit * effort,
             stall=self.voltage_limit * stall,
             droop=stall / (self.no_load_speed * robot.velocity_limit),
         )
 
 
-class _TorqueSpeedLine:
-    """|torque| within the effort, and below a line that falls with the speed."""
-
-    def __init__(self, effort: Array, stall: Array, droop: Array) -> None:
-        self._effort, self._stall, self._droop = effort, stall, droop
-
-    def limit(self, torque: Array, joint_velocity: Array) -> None:
-        braking = self._droop * joint_velocity
-        np.minimum(torque, self._stall - braking, out=torque)
-        np.maximum(torque, -self._stall - braking, out=torque)
-        np.minimum(torque, self._effort, out=torque)
-        np.maximum(torque, -self._effort, out=torque)
+@compiled
+def limited(drives: Block, joint: int, torque: float, velocity: float) -> float:
+    """A torque (Nm) within the effort, and below a line that falls with the speed (rad/s)."""
+    braking: float = drives.droop[joint] * velocity
+    stall: float = drives.stall[joint]
+    effort: float = drives.effort[joint]
+    torque = max(min(torque, stall - braking), -stall - braking)
+    return max(min(torque, effort), -effort)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from icub_jump_env.checks import check_number, store
-
-Array = NDArray[np.float64]
+from icub_jump_env.compiled import compiled
+from icub_jump_env.records import Block
 
 
 @dataclass(frozen=True)
@@ -33,57 +30,27 @@ class ServoGains:
         store(self, damping=check_number("damping", self.damping, 0.0, 1e5, "Nm s/rad"))
 
 
-class JointServo:
+@compiled
+def servo_torque(drives: Block, joint: int, position: float, velocity: float) -> float:
     """PD control on a position that moves with the commanded velocity.
 
     In velocity control the servo integrates the command itself, which makes it a PI
     velocity servo. Its position error is kept within what the effort limit can use, so
     that it does not wind up. Runs at each physics step.
+
+    Args:
+        drives: The actuators; this moves the position.
+        joint: Which joint.
+        position: Of the encoder (rad).
+        velocity: Of the encoder (rad/s).
+
+    Returns:
+        Torque (Nm), not limited.
     """
-
-    def __init__(self, dt: float, gains: ServoGains, scale: Array, effort_limit: Array) -> None:
-        """Set up the servo.
-
-        Args:
-            dt: Physics step (s).
-            gains: Nominal gains.
-            scale: (n,) factor on the gains of each joint.
-            effort_limit: (n,) largest torques (Nm).
-        """
-        self._dt = dt
-        self._stiffness = gains.stiffness * scale
-        self._damping = gains.damping * scale
-        self._largest_error = effort_limit / self._stiffness
-        self._reference = np.zeros_like(effort_limit)
-        self._torque = np.zeros_like(effort_limit)
-
-    def reset(self, joint_position: Array, torque: Array) -> None:
-        """Hold ``joint_position`` ((n,) rad) with ``torque`` ((n,) Nm)."""
-        self._reference[:] = joint_position + torque / self._stiffness
-
-    def move_to(self, position: Array) -> None:
-        """Set the position ((n,) rad) that moves on with the commanded velocity."""
-        self._reference[:] = position
-
-    def torque(
-        self, velocity_command: Array, joint_position: Array, joint_velocity: Array
-    ) -> Array:
-        """Advance by one physics step.
-
-        Args:
-            velocity_command: (n,) rad/s.
-            joint_position: (n,) encoders (rad).
-            joint_velocity: (n,) encoders (rad/s).
-
-        Returns:
-            (n,) torques (Nm), not limited; a buffer that the next call overwrites.
-        """
-        reference, torque = self._reference, self._torque
-        reference += velocity_command * self._dt
-        error = reference - joint_position
-        np.minimum(error, self._largest_error, out=error)
-        np.maximum(error, -self._largest_error, out=error)
-        np.add(error, joint_position, out=reference)
-        np.multiply(error, self._stiffness, out=torque)
-        torque += self._damping * (velocity_command - joint_velocity)
-        return torque
+    command, largest = drives.velocity_command[joint], drives.largest_error[joint]
+    error = drives.reference[joint] + command * drives.dt - position
+    error = max(min(error, largest), -largest)
+    drives.reference[joint] = error + position
+    braking: float = drives.damping[joint] * (command - velocity)
+    torque: float = error * drives.stiffness[joint] + braking
+    return torque

@@ -3,38 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
-from typing import Literal, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Literal, NamedTuple
 
 from icub_jump_env.checks import check_choice, check_number, store
+from icub_jump_env.compiled import compiled
+from icub_jump_env.records import Block
 
-Array = NDArray[np.float64]
 
+class LoopParameters(NamedTuple):
+    """A torque loop as :class:`icub_jump_env.simulation.actuators.drives.Drives` has it.
 
-class TorqueLoop(Protocol):
-    """Low-level torque controllers of all joints."""
+    Attributes:
+        loop_gain: Share of an error that it takes off in a step.
+        loop_measures: Whether it feeds back the measured torque.
+        delay: Age of that (physics steps).
+        friction_compensation: Share of the friction that it compensates.
+        torque_constant: True torque constant over the one that it assumes.
+    """
 
-    def reset(self, torque: Array) -> None:
-        """Start from (n,) joint torques (Nm) in balance."""
-        ...
-
-    def motor_torque(self, desired: Array, measured: Array, friction: Array) -> Array:
-        """Advance by one physics step.
-
-        Args:
-            desired: (n,) joint torques asked for (Nm).
-            measured: (n,) joint torques measured (Nm); the loop may keep the array.
-            friction: (n,) joint friction (Nm), for loops that compensate it by model.
-
-        Returns:
-            (n,) motor torques on the joint side (Nm); a buffer which the caller clips in
-            place, so that a loop with a state cannot wind up.
-        """
-        ...
+    loop_gain: float = 1.0
+    loop_measures: bool = False
+    delay: int = 0
+    friction_compensation: float = 0.0
+    torque_constant: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -46,9 +38,9 @@ class IdealTorque:
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, ("ideal",))
 
-    def make(self, dt: float, n_joints: int) -> TorqueLoop:
-        """The loops of ``n_joints`` joints at a physics step of ``dt`` (s)."""
-        return _Ideal(n_joints)
+    def parameters(self, dt: float) -> LoopParameters:
+        """Its parameters at a physics step of ``dt`` (s)."""
+        return LoopParameters()
 
 
 @dataclass(frozen=True)
@@ -78,9 +70,13 @@ class TorqueFeedback:
         store(self, bandwidth=check_number("bandwidth", self.bandwidth, 0.1, 1000.0, "Hz"))
         store(self, delay=check_number("delay", self.delay, 0.0, 0.1, "s"))
 
-    def make(self, dt: float, n_joints: int) -> TorqueLoop:
-        """The loops of ``n_joints`` joints at a physics step of ``dt`` (s)."""
-        return _Feedback(self, dt, n_joints)
+    def parameters(self, dt: float) -> LoopParameters:
+        """Its parameters at a physics step of ``dt`` (s)."""
+        return LoopParameters(
+            loop_gain=-math.expm1(-2 * math.pi * self.bandwidth * dt),
+            loop_measures=True,
+            delay=round(self.delay / dt),
+        )
 
 
 @dataclass(frozen=True)
@@ -123,50 +119,36 @@ class CurrentControl:
             ),
         )
 
-    def make(self, dt: float, n_joints: int) -> TorqueLoop:
-        """The loops of ``n_joints`` joints at a physics step of ``dt`` (s)."""
-        return _Current(self, dt, n_joints)
+    def parameters(self, dt: float) -> LoopParameters:
+        """Its parameters at a physics step of ``dt`` (s)."""
+        return LoopParameters(
+            loop_gain=-math.expm1(-2 * math.pi * self.bandwidth * dt),
+            friction_compensation=self.friction_compensation,
+            torque_constant=self.torque_constant,
+        )
 
 
-class _Ideal:
-    def __init__(self, n_joints: int) -> None:
-        self._torque = np.zeros(n_joints)
+@compiled
+def loop_torque(drives: Block, joint: int, measured: float) -> float:
+    """Advance a torque loop by one physics step.
 
-    def reset(self, torque: Array) -> None:
-        self._torque[:] = torque
+    Args:
+        drives: The actuators; the newest measurements are in the ring.
+        joint: Which joint.
+        measured: The measured joint torque that it feeds back, if it does (Nm).
 
-    def motor_torque(self, desired: Array, measured: Array, friction: Array) -> Array:
-        self._torque[:] = desired
-        return self._torque
-
-
-class _Feedback:
-    def __init__(self, config: TorqueFeedback, dt: float, n_joints: int) -> None:
-        self._gain = -math.expm1(-2 * math.pi * config.bandwidth * dt)
-        self._torque = np.zeros(n_joints)
-        self._measured: deque[Array] = deque(maxlen=1 + round(config.delay / dt))
-
-    def reset(self, torque: Array) -> None:
-        self._torque[:] = torque
-        self._measured.extend(torque.copy() for _ in range(self._measured.maxlen or 0))
-
-    def motor_torque(self, desired: Array, measured: Array, friction: Array) -> Array:
-        self._measured.append(measured)
-        self._torque += self._gain * (desired - self._measured[0])
-        return self._torque
-
-
-class _Current:
-    def __init__(self, config: CurrentControl, dt: float, n_joints: int) -> None:
-        self._share = -math.expm1(-2 * math.pi * config.bandwidth * dt)
-        self._compensation = config.friction_compensation
-        self._torque_constant = config.torque_constant
-        self._torque = np.zeros(n_joints)
-
-    def reset(self, torque: Array) -> None:
-        self._torque[:] = torque
-
-    def motor_torque(self, desired: Array, measured: Array, friction: Array) -> Array:
-        asked = self._torque_constant * (desired + self._compensation * friction)
-        self._torque += self._share * (asked - self._torque)
-        return self._torque
+    Returns:
+        Motor torque (Nm), which the loop keeps; what limits it sets it there, too, so that no
+        loop can wind up.
+    """
+    asked = drives.torque_command[joint]
+    if drives.loop_measures:
+        asked += drives.loop_torque[joint] - measured
+    else:
+        asked += drives.friction_compensation * drives.friction[joint]
+        asked *= drives.torque_constant
+    # In this form an ideal loop, of gain 1, gives exactly what is asked for.
+    gain = drives.loop_gain
+    torque: float = gain * asked + (1.0 - gain) * drives.loop_torque[joint]
+    drives.loop_torque[joint] = torque
+    return torque

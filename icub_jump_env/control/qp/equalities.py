@@ -1,0 +1,90 @@
+"""The closed form of a QP whose inequalities are not active."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from icub_jump_env.compiled import compiled
+from icub_jump_env.control.qp.problem import QuadraticProgram
+from icub_jump_env.linear_algebra import cholesky, solve, solve_transposed
+from icub_jump_env.records import Array, Block, Record
+
+
+class EqualitySolution(Record):
+    """A solution with the room that it takes to find it; of n variables and e equalities.
+
+    Attributes:
+        x: (n,) primal variables.
+        multipliers: (n + m,) of the bounds and rows; none but the equalities' differs from zero.
+        factor: (n, n) upper, H = factor^T factor.
+        rows: (e + 1, n) the equalities' rows and the gradient, times factor^-1.
+        schur: (e, e) product of these rows.
+    """
+
+    x: Annotated[Array, ("n",)]
+    multipliers: Annotated[Array, ("n + m",)]
+    factor: Annotated[Array, ("n", "n")]
+    rows: Annotated[Array, ("e + 1", "n")]
+    schur: Annotated[Array, ("e", "e")]
+
+    def __init__(self, problem: QuadraticProgram) -> None:
+        n, rows, e = problem.n, len(problem.lower), problem.n_equalities
+        super().__init__({"n": n, "n + m": rows, "e": e, "e + 1": e + 1})
+
+
+@compiled
+def solve_equalities(problem: Block, solution: Block) -> bool:
+    """Solve a QP as if it had no inequalities.
+
+    With H = U^T U, y = U x and the equalities A x = b it reads min 1/2 y^T y + (U^-T g)^T y
+    subject to (A U^-1) y = b, whose multipliers follow from an (e, e) system.
+
+    Args:
+        problem: Block of the QP.
+        solution: Block of the :class:`EqualitySolution`, which this fills.
+
+    Returns:
+        Whether it solves the QP: there is one solution, and it keeps the inequalities.
+    """
+    p, found = problem[0], solution[0]
+    factor, rows, schur = found.factor, found.rows, found.schur
+    n, m, e = p.g.shape[0], p.C.shape[0], schur.shape[0]
+    if not cholesky(p.H, factor):
+        return False
+    gradient, multipliers = rows[e], found.multipliers[n + m - e :]
+    gradient[:] = p.g
+    solve_transposed(factor, gradient)
+    for a in range(e):
+        rows[a] = p.C[m - e + a]
+        solve_transposed(factor, rows[a])
+        value = p.lower[n + m - e + a]
+        for j in range(n):
+            value += rows[a, j] * gradient[j]
+        multipliers[a] = -value
+        for b in range(a + 1):
+            value = 0.0
+            for j in range(n):
+                value += rows[a, j] * rows[b, j]
+            schur[b, a] = value
+    if not cholesky(schur, schur):
+        return False
+    solve_transposed(schur, multipliers)
+    solve(schur, multipliers)
+
+    x = found.x
+    for j in range(n):
+        x[j] = -gradient[j]
+    for a in range(e):
+        for j in range(n):
+            x[j] -= multipliers[a] * rows[a, j]
+    solve(factor, x)
+    for j in range(n):
+        if not p.lower[j] <= x[j] <= p.upper[j]:
+            return False
+    for a in range(m - e):
+        value = 0.0
+        for j in range(n):
+            value += p.C[a, j] * x[j]
+        if not p.lower[n + a] <= value <= p.upper[n + a]:
+            return False
+    return True
