@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from icub_jump_env.config import VERSIONS, JumpConfig
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import CONTROLLERS, ControllerName, SolverName, TorqueConfig
 from icub_jump_env.control.phases import Tick
 from icub_jump_env.control.qp.check import check_solution
@@ -36,6 +36,7 @@ from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.robot.statics import make_stance
+from icub_jump_env.versions import VERSIONS
 
 Sample = tuple[float, np.ndarray, np.ndarray]
 

@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -67,20 +66,7 @@ from icub_jump_env.simulation.sensor_models import (
     SensorName,
 )
 
-EnvName = Literal["ICubJump-v0", "ICubJump-v1"]
 PhysicsLoop = Literal["compiled", "python"]
-VERSIONS: Mapping[EnvName, Mapping[str, Any]] = MappingProxyType(
-    {
-        "ICubJump-v0": {},
-        "ICubJump-v1": {
-            "planner": "whole_body",
-            "estimator": "imu",
-            "flight": "feedback",
-            "landing": "feedback",
-        },
-    }
-)
-"""The registered environments, and where their defaults are not those of JumpConfig."""
 
 JUMP_HEIGHT_RANGE = (0.01, 0.15)
 MOST_JUMPS = 100
@@ -93,7 +79,7 @@ AGENT_FREQUENCY_RANGE = (1.0, 1000.0)
 class JumpConfig(WithShortcuts):
     """What ``gymnasium.make("ICubJump-v0", ...)`` takes, beside the :class:`Shortcuts`.
 
-    The defaults are those of v0; :data:`VERSIONS` says which differ in v1.
+    The defaults are those of v0; :data:`icub_jump_env.versions.VERSIONS` says which differ in v1.
 
     Attributes:
         robot: Model of the icub-models package.

@@ -92,7 +92,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Version history
     * v1: the same with other defaults: ``planner="whole_body"``, ``estimator="imu"``,
-      ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.config.VERSIONS`).
+      ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.versions.VERSIONS`).
     * v0: Initial version: the paper's jump. It stays as it is, whatever Gymnasium says of newer
       ones.
     """
@@ -234,7 +234,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         terminated = self._outcome != "running"
         if self._outcome != "diverged":
             self._observe()
-        ended = self._series.jumps[before - 1 : None if terminated else -1]
+        ended = (self._series.jumps if terminated else self._series.ended)[before - 1 :]
         terms = reward_terms([] if already_over else ended, action64, self.config.reward)
         if self.render_mode == "human":
             self.render()
@@ -348,7 +348,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "phase": one_hot,
             "launch_progress": min(1.0, jump_time / plan.duration),
             "time": jump_time,
-            "jump_height": self._series.jumps[-1].height,
+            "jump_height": self._series.height,
             "com_displacement": plan.displacement,
             "takeoff_time": plan.duration,
             "joint_position": readings.joint_position - self.robot.crouch,

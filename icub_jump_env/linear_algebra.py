@@ -33,6 +33,32 @@ def rotate_back(R: Array, v: Array, out: Array) -> None:
 
 
 @compiled
+def add_rows(factors: Array, rows: Array, first: int, out: Array) -> None:
+    """Add rows times their factors, one after the other.
+
+    Four at a time, as it costs more to read and write ``out`` than to calculate.
+
+    Args:
+        factors: (k,) of the first k rows.
+        rows: (k or more, m) of which the columns from ``first`` on count.
+        first: Index.
+        out: (n,) to which this adds the n entries of each row.
+    """
+    k, n = len(factors), len(out)
+    whole = k - k % 4
+    for i in range(0, whole, 4):
+        f0, f1, f2, f3 = factors[i], factors[i + 1], factors[i + 2], factors[i + 3]
+        r0, r1 = rows[i, first:], rows[i + 1, first:]
+        r2, r3 = rows[i + 2, first:], rows[i + 3, first:]
+        for j in range(n):
+            out[j] = (((out[j] + f0 * r0[j]) + f1 * r1[j]) + f2 * r2[j]) + f3 * r3[j]
+    for i in range(whole, k):
+        factor, row = factors[i], rows[i, first:]
+        for j in range(n):
+            out[j] += factor * row[j]
+
+
+@compiled
 def cholesky(A: Array, U: Array) -> bool:
     """Upper U with U^T U = A for the first rows and columns of ``U`` that ``A`` has.
 
@@ -44,20 +70,19 @@ def cholesky(A: Array, U: Array) -> bool:
         Whether A is positive definite; else U is of no use.
     """
     n = A.shape[0]
+    factors = np.empty(n)
     for i in range(n):
-        for j in range(i, n):
-            U[i, j] = A[i, j]
-    for i in range(n):
-        pivot = U[i, i]
-        if not pivot > 0.0:
+        row = U[i, i:n]
+        for j in range(n - i):
+            row[j] = A[i, i + j]
+        for k in range(i):
+            factors[k] = -U[k, i]
+        add_rows(factors[:i], U, i, row)
+        if not row[0] > 0.0:
             return False
-        scale = 1.0 / math.sqrt(pivot)
-        for j in range(i, n):
-            U[i, j] *= scale
-        for k in range(i + 1, n):
-            factor = U[i, k]
-            for j in range(k, n):
-                U[k, j] -= factor * U[i, j]
+        scale = 1.0 / math.sqrt(row[0])
+        for j in range(n - i):
+            row[j] *= scale
     return True
 
 
@@ -70,6 +95,19 @@ def solve_transposed(U: Array, b: Array) -> None:
         factor = b[i]
         for j in range(i + 1, n):
             b[j] -= factor * U[i, j]
+
+
+@compiled
+def solve_columns_transposed(U: Array, B: Array) -> None:
+    """Replace B, (n, k), by U^-T B."""
+    n = B.shape[0]
+    factors = np.empty(n)
+    for i in range(n):
+        for k in range(i):
+            factors[k] = -U[k, i]
+        add_rows(factors[:i], B, 0, B[i])
+        for j in range(B.shape[1]):
+            B[i, j] /= U[i, i]
 
 
 @compiled

@@ -195,6 +195,36 @@ class TestLoops:
         assert len(steps) == seen
 
 
+class TestSettling:
+    """A reset lets the robot settle but once, unless something is not as it was."""
+
+    def make(self, **config):
+        return gymnasium.make("ICubJump-v0", **config).unwrapped
+
+    def stand(self, env):
+        env.reset(seed=0)
+        return env.data.qpos.copy(), env.data.qacc.copy()
+
+    def test_a_changed_model_settles_anew(self):
+        changed, fresh = self.make(), self.make()
+        before = self.stand(changed)
+        for env in (changed, fresh):
+            env.model.body_mass[-1] *= 1.5
+        after = self.stand(changed)
+        assert not np.array_equal(before[0], after[0])
+        for own, other in zip(after, self.stand(fresh), strict=True):
+            np.testing.assert_array_equal(own, other)
+
+    def test_both_loops_stand_alike_after_a_jump(self):
+        compiled, python = self.make(), self.make(physics_loop="python")
+        for env in (compiled, python):
+            env.reset(seed=0)
+            for _ in range(60):
+                env.step(ZERO)
+        for own, other in zip(self.stand(compiled), self.stand(python), strict=True):
+            np.testing.assert_array_equal(own, other)
+
+
 class TestVariedWorlds:
     @pytest.mark.parametrize("controller", ["velocity", "torque"])
     def test_same_seed_same_trajectory_in_another_process_and_after_other_episodes(

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from icub_jump_env.linear_algebra import (
     add_cross,
+    add_rows,
     cholesky,
     larger,
     multiply,
@@ -17,6 +18,7 @@ from icub_jump_env.linear_algebra import (
     rotate_back,
     rotation_of,
     solve,
+    solve_columns_transposed,
     solve_transposed,
     turn_of,
 )
@@ -59,6 +61,26 @@ def test_triangular_systems_are_solved(seed, n):
     solve_transposed(U, y)
     np.testing.assert_allclose(U @ x, b, atol=1e-9)
     np.testing.assert_allclose(U.T @ y, b, atol=1e-9)
+    B = np.column_stack((b, 2.0 * b, rng.normal(size=n)))
+    X = B.copy()
+    solve_columns_transposed(U, X)
+    np.testing.assert_allclose(U.T @ X, B, atol=1e-9)
+
+
+@given(seeds, st.integers(0, 9), st.integers(1, 6), st.integers(0, 5))
+def test_rows_are_added_one_after_the_other(seed, k, n, first):
+    """Whether some are taken together or not, in the order in which a plain loop adds them."""
+    rng = np.random.default_rng(seed)
+    factors, rows, out = (
+        rng.normal(size=k),
+        rng.normal(size=(k + 1, first + n)),
+        rng.normal(size=n),
+    )
+    expected = out.copy()
+    for factor, row in zip(factors, rows[:k], strict=True):
+        expected += factor * row[first:]
+    add_rows(factors, rows, first, out)
+    np.testing.assert_array_equal(out, expected)
 
 
 @given(seeds)

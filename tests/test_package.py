@@ -26,7 +26,7 @@ LAYERS = (
     ("robot",),
     ("mappings", "linear_algebra", "records"),
     ("compiled",),
-    ("checks", "files", "carded"),
+    ("checks", "files", "carded", "versions"),
     ("errors",),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
@@ -89,7 +89,9 @@ def test_importing_registers_and_loads_nothing_heavy():
     program = (
         "import icub_jump_env, gymnasium, sys\n"
         "assert 'ICubJump-v0' in gymnasium.registry\n"
-        "assert not {'torch', 'stable_baselines3', 'matplotlib', 'mujoco'} & set(sys.modules)\n"
+        "heavy = {'torch', 'stable_baselines3', 'matplotlib', 'mujoco', 'numba', 'pinocchio', 'scipy'}\n"
+        "assert not heavy & set(sys.modules)\n"
+        "assert all(hasattr(icub_jump_env, name) for name in icub_jump_env.__all__)\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
 

@@ -8,8 +8,9 @@ import pytest
 from conftest import ZERO, random_action
 from gymnasium.utils.env_checker import check_env
 
-from icub_jump_env.config import VERSIONS, JumpConfig
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.simulation.randomization import Randomization
+from icub_jump_env.versions import VERSIONS
 
 V1 = JumpConfig.of(**VERSIONS["ICubJump-v1"])
 

@@ -17,11 +17,12 @@ from typing import Any, NoReturn, TypeVar, cast, get_args
 import tyro
 from rich.console import Console
 
-from icub_jump_env.config import VERSIONS, EnvName, JumpConfig
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ICubJumpError, PolicyMismatchError, one_line, shown
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.files import read_json
 from icub_jump_env.simulation.opengl import import_mujoco
+from icub_jump_env.versions import VERSIONS, EnvName
 
 T = TypeVar("T")
 

@@ -10,9 +10,10 @@ from typing import Annotated, Literal
 import tyro
 
 from icub_jump_env.checks import check_count, store
-from icub_jump_env.config import EnvName, JumpConfig
+from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.shortcuts import Shortcuts
+from icub_jump_env.versions import EnvName
 
 STUDY_EPISODES = 20
 """Episodes of each case of a study."""

@@ -57,6 +57,7 @@ class SeriesRecorder:
 
     Attributes:
         present: Watches the latest jump.
+        ended: The jumps that are over.
         rules: When the episode is over.
     """
 
@@ -73,12 +74,12 @@ class SeriesRecorder:
         self._success = success
         self.rules = Rules()
         self._heights: list[float] = []
-        self._ended: list[Jump] = []
+        self.ended: list[Jump] = []
         self._start = np.zeros(2)
 
     def reset(self) -> None:
         """An episode begins."""
-        self._heights, self._ended = [], []
+        self._heights, self.ended = [], []
 
     @property
     def begun(self) -> int:
@@ -88,7 +89,12 @@ class SeriesRecorder:
     @property
     def jumps(self) -> list[Jump]:
         """All jumps that have begun; the last one is as it is now."""
-        return [*self._ended, Jump(self._heights[-1], self.present.metrics)]
+        return [*self.ended, Jump(self.height, self.present.metrics)]
+
+    @property
+    def height(self) -> float:
+        """Command of the present jump (m)."""
+        return self._heights[-1]
 
     def begin(
         self,
@@ -110,7 +116,7 @@ class SeriesRecorder:
         """
         if self._heights:
             self.present.conclude()
-            self._ended.append(Jump(self._heights[-1], self.present.metrics))
+            self.ended.append(Jump(self.height, self.present.metrics))
         else:
             self._start[:] = _between_the_feet(state)
         self._heights.append(height)
@@ -131,9 +137,9 @@ class SeriesRecorder:
     @property
     def is_success(self) -> bool:
         """Whether each jump was a success, and there were all."""
-        return self.is_last and all(
-            jump.metrics.is_success(jump.height, self._success) for jump in self.jumps
-        )
+        if not (self.is_last and self.present.record.landed):
+            return False
+        return all(jump.metrics.is_success(jump.height, self._success) for jump in self.jumps)
 
     def as_dict(self, state: TrueState) -> dict[str, Any]:
         """What the jumps that have begun say together, in the true ``state`` of now.

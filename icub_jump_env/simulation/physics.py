@@ -13,6 +13,8 @@ from icub_jump_env.robot.robot import Robot
 
 Array = NDArray[np.float64]
 
+_MOVES = ("actuator_", "body_", "dof_", "eq_", "geom_", "jnt_", "qpos", "sensor_", "site_")
+"""How fields of the model begin that say how it moves and what is measured."""
 _HUGE = 1e3
 """No position (m, rad) or velocity (m/s, rad/s) of a jumping robot comes near this."""
 
@@ -68,6 +70,8 @@ class Physics:
         self.warnings = data.warning.number
         # MuJoCo names these for C code beside its bindings; see its issues 983 and 2564.
         self.addresses = self.model._address, data._address
+        own = [name for name in dir(self.model) if name.startswith(_MOVES)]
+        self._parameters = [getattr(self.model, name) for name in own]
         self._dt = float(self.model.opt.timestep)
         self._last_time = data.time
         self.evaluated_time = data.time
@@ -94,6 +98,23 @@ class Physics:
         self._qpos[:] = qpos
         mujoco.mj_forward(self.model, self.data)
         self._last_time = self.evaluated_time = 0.0
+
+    def parameters(self) -> bytes:
+        """The numbers of the model, but for its meshes: while they are the same, it moves alike."""
+        options = self.model.opt
+        others = [getattr(options, name) for name in dir(options) if name[0].islower()]
+        return b"".join(np.asarray(value).tobytes() for value in [*self._parameters, *others])
+
+    def state(self) -> Array:
+        """All that the next step depends on beside the model."""
+        size = mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_INTEGRATION)
+        state = np.empty(size)
+        mujoco.mj_getState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+        return state
+
+    def set_state(self, state: Array) -> None:
+        """Go on from a :meth:`state`."""
+        mujoco.mj_setState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
 
     def start_from_rest(self) -> None:
         """Stop all motion and set the time to zero, as the last part of a reset."""

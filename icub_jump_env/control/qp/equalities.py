@@ -6,7 +6,13 @@ from typing import Annotated
 
 from icub_jump_env.compiled import compiled
 from icub_jump_env.control.qp.problem import QuadraticProgram
-from icub_jump_env.linear_algebra import cholesky, solve, solve_transposed
+from icub_jump_env.linear_algebra import (
+    add_rows,
+    cholesky,
+    solve,
+    solve_columns_transposed,
+    solve_transposed,
+)
 from icub_jump_env.records import Array, Block, Record
 
 
@@ -17,14 +23,14 @@ class EqualitySolution(Record):
         x: (n,) primal variables.
         multipliers: (n + m,) of the bounds and rows; none but the equalities' differs from zero.
         factor: (n, n) upper, H = factor^T factor.
-        rows: (e + 1, n) the equalities' rows and the gradient, times factor^-1.
+        columns: (n, e + 1) factor^-T times the equalities' rows, as columns, and the gradient.
         schur: (e, e) product of these rows.
     """
 
     x: Annotated[Array, ("n",)]
     multipliers: Annotated[Array, ("n + m",)]
     factor: Annotated[Array, ("n", "n")]
-    rows: Annotated[Array, ("e + 1", "n")]
+    columns: Annotated[Array, ("n", "e + 1")]
     schur: Annotated[Array, ("e", "e")]
 
     def __init__(self, problem: QuadraticProgram) -> None:
@@ -47,25 +53,26 @@ def solve_equalities(problem: Block, solution: Block) -> bool:
         Whether it solves the QP: there is one solution, and it keeps the inequalities.
     """
     p, found = problem[0], solution[0]
-    factor, rows, schur = found.factor, found.rows, found.schur
+    factor, columns, schur = found.factor, found.columns, found.schur
     n, m, e = p.g.shape[0], p.C.shape[0], schur.shape[0]
     if not cholesky(p.H, factor):
         return False
-    gradient, multipliers = rows[e], found.multipliers[n + m - e :]
-    gradient[:] = p.g
-    solve_transposed(factor, gradient)
+    for j in range(n):
+        for a in range(e):
+            columns[j, a] = p.C[m - e + a, j]
+        columns[j, e] = p.g[j]
+    solve_columns_transposed(factor, columns)
+    multipliers = found.multipliers[n + m - e :]
     for a in range(e):
-        rows[a] = p.C[m - e + a]
-        solve_transposed(factor, rows[a])
-        value = p.lower[n + m - e + a]
-        for j in range(n):
-            value += rows[a, j] * gradient[j]
-        multipliers[a] = -value
-        for b in range(a + 1):
-            value = 0.0
-            for j in range(n):
-                value += rows[a, j] * rows[b, j]
-            schur[b, a] = value
+        multipliers[a] = p.lower[n + m - e + a]
+        schur[a, a:] = 0.0
+    for j in range(n):
+        gradient = columns[j, e]
+        for a in range(e):
+            multipliers[a] += columns[j, a] * gradient
+    for a in range(e):
+        multipliers[a] = -multipliers[a]
+        add_rows(columns[:, a], columns, a, schur[a, a:])
     if not cholesky(schur, schur):
         return False
     solve_transposed(schur, multipliers)
@@ -73,10 +80,9 @@ def solve_equalities(problem: Block, solution: Block) -> bool:
 
     x = found.x
     for j in range(n):
-        x[j] = -gradient[j]
-    for a in range(e):
-        for j in range(n):
-            x[j] -= multipliers[a] * rows[a, j]
+        x[j] = -columns[j, e]
+        for a in range(e):
+            x[j] -= multipliers[a] * columns[j, a]
     solve(factor, x)
     for j in range(n):
         if not p.lower[j] <= x[j] <= p.upper[j]:

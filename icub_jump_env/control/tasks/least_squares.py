@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from icub_jump_env.compiled import compiled
+from icub_jump_env.linear_algebra import add_rows
 from icub_jump_env.records import Array
 
 
@@ -21,15 +22,10 @@ def least_squares(
     """
     n = gradient.shape[0]
     for i in range(n):
-        for j in range(i, n):
-            hessian[i, j] = 0.0
+        for row in range(target.shape[0]):
+            gradient[i] -= rows[row, i] * target[row]
+        hessian[i, i:] = 0.0
         hessian[i, i] = diagonal[i]
-    for row in range(target.shape[0]):
-        for i in range(n):
-            factor = rows[row, i]
-            gradient[i] -= factor * target[row]
-            for j in range(i, n):
-                hessian[i, j] += factor * rows[row, j]
-    for i in range(n):
+        add_rows(rows[:, i], rows, i, hessian[i, i:])
         for j in range(i):
             hessian[i, j] = hessian[j, i]

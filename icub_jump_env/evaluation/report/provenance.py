@@ -14,7 +14,17 @@ from typing import Any
 import icub_jump_env
 from icub_jump_env.config import JumpConfig
 
-_PACKAGES = ("daqp", "gymnasium", "icub-models", "mujoco", "numpy", "osqp", "pin", "scipy")
+_PACKAGES = (
+    "daqp",
+    "gymnasium",
+    "icub-models",
+    "mujoco",
+    "numba",
+    "numpy",
+    "osqp",
+    "pin",
+    "scipy",
+)
 
 
 SOURCE = "source"

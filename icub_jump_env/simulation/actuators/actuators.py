@@ -76,6 +76,8 @@ class Actuators:
         drives.velocity_command[:] = 0.0
         drives.torque_command[:] = np.nan
         drives.torque_error[:] = 0.0
+        drives.loop_torque[:], drives.measured[:], drives.oldest = 0.0, 0.0, 0.0
+        drives.friction[:] = 0.0
 
     def command(self, command: JointCommand) -> None:
         """Take a new command."""
