@@ -2,7 +2,7 @@
 
 Each peer decides at the same states of the same robot, along our nominal launch, in a process
 and, where its versions clash with ours, in a virtual environment of its own, which is made at the
-first call. What each peer solves: docs/results.md, "Peers".
+first call. What each peer solves stands in its file in ``peer_ticks``.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/peers.py --json peers.json
 """
