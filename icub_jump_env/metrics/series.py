@@ -24,8 +24,9 @@ TAKEOFF_GRACE = 0.5
 NEXT_GRACE = 3.0
 """Time after touch-down (s) within which the next jump, if there is one, must have begun."""
 
+RUNNING, FELL, STOOD, NO_TAKEOFF = range(4)
 OUTCOMES = ("running", "fell", "stood", "no take-off")
-"""By the number that :func:`judge` returns."""
+"""What these numbers, which :func:`judge` returns, are called."""
 
 
 class Rules(Record):
@@ -137,6 +138,7 @@ class SeriesRecorder:
     @property
     def is_success(self) -> bool:
         """Whether each jump was a success, and there were all."""
+        # The metrics take time to gather, and in most steps this says enough.
         if not (self.is_last and self.present.record.landed):
             return False
         return all(jump.metrics.is_success(jump.height, self._success) for jump in self.jumps)
@@ -176,7 +178,7 @@ def _between_the_feet(state: TrueState) -> Array:
 
 @compiled
 def judge(state: Block, rules: Block, record: Block) -> int:
-    """The number of the episode's outcome in the true state, among :data:`OUTCOMES`.
+    """The number of the episode's outcome in the true state; :data:`OUTCOMES` has its name.
 
     Args:
         state: Block of the :class:`icub_jump_env.metrics.state.TrueState`.
@@ -186,15 +188,15 @@ def judge(state: Block, rules: Block, record: Block) -> int:
     s, r, jump = state[0], rules[0], record[0]
     tilt = math.acos(min(1.0, max(-1.0, s.chest_up[2])))
     if not s.only_feet_touch or tilt > FALLEN_TILT:
-        return 1
+        return FELL
     if r.is_last and has_stood(jump):
-        return 2
+        return STOOD
     time = s.time - jump.start
     airborne = s.ground_force < AIRBORNE_FORCE
     late = time >= r.takeoff_time + TAKEOFF_GRACE
     if late and not airborne and math.isnan(jump.takeoff_time):
-        return 3
+        return NO_TAKEOFF
     # A robot that does not notice its landing waits for it.
     if not r.is_last and time - jump.touchdown_time >= NEXT_GRACE:
-        return 3
-    return 0
+        return NO_TAKEOFF
+    return RUNNING

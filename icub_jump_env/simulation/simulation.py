@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.estimation.readings import Readings
-from icub_jump_env.metrics.series import OUTCOMES, SeriesRecorder
+from icub_jump_env.metrics.series import OUTCOMES, RUNNING, SeriesRecorder
 from icub_jump_env.records import Block
 from icub_jump_env.simulation.actuators.actuators import Actuators
 from icub_jump_env.simulation.actuators.config import ActuatorConfig
@@ -27,7 +27,6 @@ from icub_jump_env.simulation.sensor_models import SensorConfig
 from icub_jump_env.simulation.sensors import Sensors
 from icub_jump_env.simulation.stepping import (
     EVENT,
-    RUNNING,
     after_step,
     before_step,
     settle,

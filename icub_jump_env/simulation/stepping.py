@@ -17,15 +17,15 @@ from llvmlite import binding
 
 from icub_jump_env.compiled import compiled
 from icub_jump_env.metrics.recorder import watch
-from icub_jump_env.metrics.series import judge
+from icub_jump_env.metrics.series import RUNNING, judge
 from icub_jump_env.records import Array, Block
 from icub_jump_env.simulation.actuators.actuators import actuate
 from icub_jump_env.simulation.disturbances import comes, push
 from icub_jump_env.simulation.ground_truth import read_truth
 
-RUNNING, EVENT, DIVERGED = 0, -1, -2
-"""Why the steps ended, beside the numbers of :data:`icub_jump_env.metrics.series.OUTCOMES`: they
-were all taken; a disturbance is due before the next one; MuJoCo warned."""
+EVENT, DIVERGED = -1, -2
+"""Why the steps ended, beside what :func:`icub_jump_env.metrics.series.judge` says: a disturbance is
+due before the next one; MuJoCo warned."""
 
 
 def _find_mj_step() -> Any:
