@@ -18,5 +18,5 @@ of the shipped policies, which were chosen earlier, are of those seeds.
 PLANNER_TEST = range(5000, 5200)
 """Held out from everything that chose whole-body plans."""
 
-LANDING_TEST = range(6200, 6400)
+LANDING_TEST = range(5600, 5800)
 """Held out from everything that chose estimator, flight and landing."""

@@ -328,15 +328,15 @@ class WrenchLanding(FeedbackLanding):
         setpoint.posture[self._ankles] = state.joint_position[self._ankles]
         setpoint.com_position[:] = forward + offset[0], offset[1], height
         away = state.joint_position - setpoint.posture
-        cop, pitch_momentum, lift = self._catch(state, setpoint.com_position, away)
-        self._wrench_terms.lift = lift
+        catching = self._balance(state, setpoint.com_position, away)
+        self._wrench_terms.lift = catching.lift
         momentum, most = setpoint.angular_momentum, gains.hardest_lunge
-        lunge = min(max((pitch_momentum - momentum[1]) / self._dt, -most), most)
+        lunge = min(max((catching.momentum - momentum[1]) / self._dt, -most), most)
         momentum[1] += lunge * self._dt
         setpoint.angular_momentum_rate[1] = lunge
 
         stiffness, damping = gains.height
-        setpoint.com_acceleration[:] = self._horizontal(state, cop, lunge)
+        setpoint.com_acceleration[:] = self._horizontal(state, catching.pull, lunge)
         setpoint.com_acceleration[2] = (
             self._lifting
             + stiffness * (height - self._kinematics.com[2])
@@ -346,27 +346,10 @@ class WrenchLanding(FeedbackLanding):
         setpoint.com_acceleration -= GRAVITY * state.gravity
         setpoint.com_acceleration[2] -= GRAVITY
 
-    def _horizontal(self, state: RobotState, ahead_of_ankles: float, lunge: float) -> Array:
+    def _horizontal(self, state: RobotState, pull: Array, lunge: float) -> Array:
         """The CoM's acceleration (3,) of the pendulum, with the lunge's moment (Nm) (m/s^2)."""
         cos, sin = heading(state.base_rotation)
-        to_heading = np.array([[cos, sin], [-sin, cos]])
-        com, down = state.com - state.sole_position.mean(axis=0), state.gravity
-        height = max(LOWEST_COM, float(com[2]))
-        frequency = math.sqrt(GRAVITY / height)
-        lever = 1.0 / (self._kinematics.mass * height)
-        ahead, left = to_heading @ (com[:2] - com[2] / down[2] * down[:2])
-        goal = float((to_heading @ self.setpoint.com_position[:2])[1])
-        # Sideways as forward in catch(), which tells only how the feet shall share the load.
-        falling = -MOMENTUM_SHARE * lever * float(to_heading[0] @ state.angular_momentum[:2])
-        speed = float(to_heading[1] @ state.com_velocity[:2]) + falling
-        point = left - goal + speed / frequency
-        wanted = point * (1.0 + LATERAL_CAPTURE_GAIN / frequency)
-        cop = np.array(
-            [
-                ahead_of_ankles - self._robot.sole.center_x,
-                goal + min(max(wanted, -FARTHEST_LATERAL_COP), FARTHEST_LATERAL_COP),
-            ]
-        )
-        acceleration = frequency**2 * (np.array([ahead, left]) - cop)
-        acceleration[0] -= lever * lunge
-        return np.array([*(to_heading.T @ acceleration), 0.0])
+        height = max(LOWEST_COM, float((state.com - state.sole_position.mean(axis=0))[2]))
+        ahead, left = GRAVITY * pull
+        ahead -= lunge / (self._kinematics.mass * height)
+        return np.array([cos * ahead - sin * left, sin * ahead + cos * left, 0.0])

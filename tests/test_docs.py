@@ -142,7 +142,9 @@ def test_the_landing_page_states_the_gains_in_use():
         f"stop after {100 * flight.FARTHEST_YIELD:g} cm",
         f"within {flight.SPEED_SHARE:g} of theirs",
         f"({catching.CAPTURE_GAIN:g} 1/s; sideways {catching.LATERAL_CAPTURE_GAIN:g} 1/s)",
-        f"bounded by {100 * catching.FARTHEST_COP:g} cm",
+        f"{1e3 * catching.SIDE_MARGIN:g} mm within its sides",
+        f"shift it by up to {100 * catching.FARTHEST_SHIFT:g} cm",
+        f"{1e3 * landing.STAND_AHEAD:g} mm ahead of the middle of the soles",
         f"braked within {landing.BRAKING_TIME:g} s",
         f"landing posture in {landing.RISING_TIME:g} s",
     ):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from icub_jump_env.robot.robot import Robot
 
 CAPTURE_GAIN, LATERAL_CAPTURE_GAIN = 10.0, 4.0
 """How fast the CoP brings the capture point back, forward and sideways (1/s)."""
-FARTHEST_COP, FARTHEST_LATERAL_COP = 0.075, 0.06
-"""Bounds of the CoP from the middle of the soles, forward and sideways (m)."""
+SIDE_MARGIN = 0.006
+"""The CoP of a foot stays this far within the sides of its sole (m); to heel and toe it may go."""
+FARTHEST_SHIFT = 0.06
+"""The loads of the feet shift the CoP of both sideways by this much at most (m)."""
 LOWEST_COM = 0.2
 """Height that the pendulum has at least (m): a robot that falls is none."""
 MOMENTUM_SHARE = 0.5
@@ -35,6 +38,8 @@ RETURN_STIFFNESS, RETURN_DAMPING, HARDEST_RETURN = 10.0, 6.0, 4.0
 LOAD_GAIN, FASTEST_LIFT = 0.0002, 0.4
 """Speed of the feet relative to each other per wrong load (m/s per N), and the largest (m/s)."""
 
+Pair = Annotated[Array, (2,)]
+
 
 class Catching(Record):
     """What :func:`catch` knows of the robot, and what it keeps between ticks.
@@ -42,18 +47,27 @@ class Catching(Record):
     Attributes:
         mass: kg.
         dt: Control period (s).
-        soles_from_ankles: Middle of the soles, forward of the ankles (m).
+        farthest_cop: (2,) bounds of a foot's CoP from the middle of its sole, forward and left (m).
         half_stance: Half of the distance of the soles' middles (m).
         momentum_per_lunge: See :func:`lunge_momentum` (kg m^2).
         rate: Rate of the lunge (rad/s).
+        cop: (2,) where the CoP of each foot shall be, forward and left of the middle of its sole
+            (m).
+        pull: (2,) horizontal force on the CoM that goes with it, forward and left, per load.
+        momentum: Angular momentum of the lunge about the robot's left (kg m^2/s).
+        lift: Speed at which the right sole shall rise relative to the left one (m/s).
     """
 
     mass: Number
     dt: Number
-    soles_from_ankles: Number
+    farthest_cop: Pair
     half_stance: Number
     momentum_per_lunge: Number
     rate: Number
+    cop: Pair
+    pull: Pair
+    momentum: Number
+    lift: Number
 
     @classmethod
     def of(cls, kinematics: FeetFixedKinematics, dt: float) -> Catching:
@@ -67,7 +81,7 @@ class Catching(Record):
         return cls(
             mass=kinematics.mass,
             dt=dt,
-            soles_from_ankles=robot.sole.center_x,
+            farthest_cop=np.array([robot.sole.half_length, robot.sole.half_width - SIDE_MARGIN]),
             half_stance=kinematics.sole_positions[0, 1],
             momentum_per_lunge=lunge_momentum(robot),
         )
@@ -76,12 +90,12 @@ class Catching(Record):
 @compiled
 def catch(
     kinematics: Block, state: Block, com: Array, away: Array, chest_up: Array, catching: Block
-) -> tuple[float, float, float]:
+) -> None:
     """One control tick: bring the capture point of an inverted pendulum to rest above the soles.
 
     First by the CoP; where that is not enough, by a lunge: a motion of hips, torso and arms that
-    leaves the CoM where it is and has pitch momentum alone. Sideways by the loads of the feet,
-    which also finds a step under one of them.
+    leaves the CoM where it is and has pitch momentum alone. Sideways also by the loads of the
+    feet, which finds a step under one of them.
 
     Args:
         kinematics: The model, up to date for the state.
@@ -90,12 +104,7 @@ def catch(
             of the robot, up.
         away: (n,) joint displacement that is to be taken back (rad).
         chest_up: (3,) the chest's up axis, base axes.
-        catching: Block of the :class:`Catching`; this changes the rate.
-
-    Returns:
-        Where the CoP shall be, forward of the ankles (m); angular momentum of the lunge about the
-        robot's left (kg m^2/s); speed at which the right sole shall rise relative to the left one
-        (m/s).
+        catching: Block of the :class:`Catching`; this sets what is from the rate on.
     """
     model, s, c = kinematics[0], state[0], catching[0]
     cos, sin = heading(s.base_rotation)
@@ -123,19 +132,23 @@ def catch(
         lunge += model.centroidal_map[4, j] * away[j]
     lunge /= c.momentum_per_lunge
     rate = lunge_rate(
-        lunge, c.rate, needed / shift, FARTHEST_COP / shift, lean(s, chest_up, cos, sin), c.dt
+        lunge, c.rate, needed / shift, c.farthest_cop[0] / shift, lean(s, chest_up, cos, sin), c.dt
     )
     wanted = point * (1.0 + CAPTURE_GAIN / frequency) - shift * (rate - c.rate) / c.dt
     c.rate = rate
-    cop = within(com[0] + wanted, FARTHEST_COP) + c.soles_from_ankles
+    c.momentum = c.momentum_per_lunge * rate
+    c.cop[0] = within(com[0] + wanted, c.farthest_cop[0])
+    c.pull[0] = (ahead - c.cop[0]) / height
 
     speed = cos * vy - sin * vx - MOMENTUM_SHARE * lever * (cos * Hx + sin * Hy)
     point = left - com[1] + speed / frequency
     wanted = com[1] + point * (1.0 + LATERAL_CAPTURE_GAIN / frequency)
+    c.cop[1] = within(wanted, c.farthest_cop[1])
+    shift = within(wanted - c.cop[1], FARTHEST_SHIFT)
+    c.pull[1] = (left - c.cop[1] - shift) / height
     on_left, on_right = s.foot_force[0], s.foot_force[1]
-    more = (on_left + on_right) * within(wanted, FARTHEST_LATERAL_COP) / c.half_stance
-    lift = within(LOAD_GAIN * (more - on_left + on_right), FASTEST_LIFT)
-    return cop, c.momentum_per_lunge * rate, lift
+    more = (on_left + on_right) * shift / c.half_stance
+    c.lift = within(LOAD_GAIN * (more - on_left + on_right), FASTEST_LIFT)
 
 
 @compiled

@@ -22,7 +22,7 @@ from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float64]
 
-REST, SETTLING = 0.5, 0.25
+REST, SETTLING = 0.7, 0.25
 """How long a robot that jumps again stands after touch-down, and in its next crouch (s)."""
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from icub_jump_env.compiled import compiled
+from icub_jump_env.control.ankles import Ankles, ankle_joints, carry
 from icub_jump_env.control.catching import Catching, catch
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.config import SolverName
@@ -40,6 +40,8 @@ LOWEST = 0.39
 """The CoM does not sink below this height, that of the crouch (m)."""
 RISING_DELAY, RISING_TIME = 0.05, 0.4
 """When the CoM begins to rise again after it stopped, and how long that takes (s)."""
+STAND_AHEAD = 0.008
+"""The CoM stands this far ahead of the middle of the soles (m): pushes backward are the harder ones."""
 ANKLE_DAMPING = 3.0
 """Torque of the ankles per speed that the QP did not ask for (Nm s/rad)."""
 CROUCH_TIME = 0.7
@@ -108,11 +110,9 @@ class FeedbackLanding:
         self._flight, self._residual, self._dt = flight, residual, dt
         self._kinematics, self._robot = kinematics, kinematics.robot
         robot, n = kinematics.robot, kinematics.robot.n_joints
-        pitch, roll = (
-            [robot.joint_names.index(f"{side}_ankle_{axis}") for side in "lr"]
-            for axis in ("pitch", "roll")
-        )
-        self._ankle_pitch, self._ankles = np.array(pitch), np.array(pitch + roll)
+        self._ankle_joints = ankle_joints(robot)
+        self._ankles = self._ankle_joints.ravel()
+        self._ankle_geometry = Ankles.of(robot)
         # NaN leaves a joint to its servo.
         self._damping = np.full(n, np.nan)
         self._damping[self._ankles] = ANKLE_DAMPING
@@ -172,7 +172,8 @@ class FeedbackLanding:
         lag = height + z - float(kinematics.com[2])
         setpoint.com_velocity[2] = rise + self._residual.velocity[2] + HEIGHT_GAIN * lag
         away = self._position - setpoint.posture
-        cop, setpoint.angular_momentum[1], self._terms.lift = self._catch(state, com, away)
+        catching = self._balance(state, com, away)
+        setpoint.angular_momentum[1], self._terms.lift = catching.momentum, catching.lift
         solution, report = self._qp.solve(state, setpoint)
         velocity = self._terms.previous
         if report.failed:
@@ -181,15 +182,17 @@ class FeedbackLanding:
             velocity[:] = solution.x
         torque = self._damping.copy()
         follow(state.block, velocity, self._limits.block, dt, self._position, torque)
-        load(state.block, self._ankle_pitch, cop, torque)
+        joints, ankles = self._ankle_joints, self._ankle_geometry.block
+        carry(state.block, joints, catching.cop, catching.pull, ankles, torque)
         command = JointCommand(velocity.copy(), self._position.copy(), torque)
         return Tick(command, report)
 
-    def _catch(self, state: RobotState, com: Array, away: Array) -> tuple[float, float, float]:
-        """CoP, momentum and lift of :func:`icub_jump_env.control.catching.catch`."""
-        kinematics = self._kinematics
+    def _balance(self, state: RobotState, com: Array, away: Array) -> Catching:
+        """What :func:`icub_jump_env.control.catching.catch` decides."""
+        kinematics, catching = self._kinematics, self._catching
         up = kinematics.chest_up()
-        return catch(kinematics.block, state.block, com, away, up, self._catching.block)
+        catch(kinematics.block, state.block, com, away, up, catching.block)
+        return catching
 
     def crouch(self, plan: JumpPlan, time: float) -> None:
         """The balance goes on while the stand becomes the crouch, as :class:`Landing`."""
@@ -197,14 +200,14 @@ class FeedbackLanding:
         stance.update(plan.stance.posture)
         forward = float(stance.com[0] - stance.sole_positions[:, 0].mean())
         height, _ = self._height(time - self._began)
-        start = np.array([*self._stand, height, 0.0])
+        start = np.array([*self._stand, height, STAND_AHEAD])
         goal = np.array([*plan.stance.posture, stance.com[2], forward])
         self._crouch, self._crouch_began = MinimumJerk(start, goal, CROUCH_TIME), time
 
     def _stand_at(self, time: float) -> tuple[float, float, float]:
         """Place of the CoM forward (m), its height (m) and rate (m/s); moves the posture."""
         if self._crouch is None:
-            return 0.0, *self._height(time - self._began)
+            return STAND_AHEAD, *self._height(time - self._began)
         now, rate = self._crouch.sample(time - self._crouch_began)
         self.setpoint.posture[:] = now[:-2]
         # The posture's gain alone would come too late.
@@ -246,17 +249,3 @@ def follow(
         lowest, highest = bounds.lower[j] + LIMIT_MARGIN, bounds.upper[j] - LIMIT_MARGIN
         position[j] = min(max(moved, lowest), highest)
         torque[j] *= velocity[j] - s.joint_velocity[j]
-
-
-@compiled
-def load(state: Block, ankle_pitch: NDArray[np.int64], cop: float, torque: Array) -> None:
-    """Add what puts the CoP of each foot ``cop`` (m) ahead of its ankle: its load times that.
-
-    Args:
-        state: The believed state.
-        ankle_pitch: (2,) which joints pitch the left and the right foot.
-        cop: m.
-        torque: (n,) Nm.
-    """
-    for foot in range(2):
-        torque[ankle_pitch[foot]] += max(state[0].foot_force[foot], 0.0) * cop

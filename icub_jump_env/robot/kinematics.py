@@ -66,6 +66,7 @@ class FeetFixedKinematics(Record):
         base_M_ankles: ``pinocchio.SE3`` of the left and right ankle roll joint, base frame.
         ankle_p_soles: (3,) middle of each sole's underside in the frame of its ankle (m).
         J_left: (6, 6) twist of the left foot of the left leg's joints, base frame.
+        J_right: (6, 6) the same of the right foot.
         model: The Pinocchio model, shared; do not change it.
         sole_positions: (2, 3) middle of the underside of the left and right sole, both at rest
             on the floor (m).
@@ -102,7 +103,7 @@ class FeetFixedKinematics(Record):
         # Views of Pinocchio's buffers: reading an attribute costs more than using it.
         data = self.data
         self.A_base, self.A_joints = data.Ag[:, :6], data.Ag[:, 6:]
-        self.J_left = data.J[:, 6:12]
+        self.J_left, self.J_right = data.J[:, 6:12], data.J[:, 12:18]
         self.base_p_com = data.com[0]
         frames = [self.model.frames[self.model.getFrameId(name)] for name in robot.sole_frames]
         self.base_M_ankles = [data.oMi[frame.parentJoint] for frame in frames]

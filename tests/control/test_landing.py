@@ -2,7 +2,6 @@
 
 import copy
 import math
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -32,14 +31,6 @@ PITCH, ROLL = (
 )
 
 
-class Balance(NamedTuple):
-    """What the balance layer decides."""
-
-    cop: float
-    pitch_momentum: float
-    lift: float
-
-
 class Stander:
     """A believed robot that stands in its landing posture, CoM over the middle of its soles."""
 
@@ -57,16 +48,16 @@ class Stander:
         return Catching.of(self.kinematics, DT)
 
     def balance(self, catching=None, com=NOTHING, away=None):
-        return Balance(
-            *catch(
-                self.kinematics.block,
-                self.state.block,
-                np.array(com),
-                np.zeros(N) if away is None else away,
-                self.kinematics.chest_up(),
-                (self.catching() if catching is None else catching).block,
-            )
+        catching = self.catching() if catching is None else catching
+        catch(
+            self.kinematics.block,
+            self.state.block,
+            np.array(com),
+            np.zeros(N) if away is None else away,
+            self.kinematics.chest_up(),
+            catching.block,
         )
+        return catching
 
 
 @pytest.fixture
@@ -75,28 +66,42 @@ def stander():
 
 
 FROM_ANKLE = ROBOT.sole.center_x
+FARTHEST = Catching.of(FeetFixedKinematics(ROBOT), DT).farthest_cop
 
 
 class TestCatch:
     def test_at_rest_the_cop_is_below_the_com(self, stander):
         balance = stander.balance()
-        assert balance.cop == pytest.approx(FROM_ANKLE)
-        assert balance.pitch_momentum == pytest.approx(0.0, abs=1e-12)
+        np.testing.assert_allclose((balance.cop, balance.pull), 0.0, atol=1e-12)
+        assert balance.momentum == pytest.approx(0.0, abs=1e-12)
         assert balance.lift == pytest.approx(0.0, abs=1e-12)
 
+    @pytest.mark.parametrize("axis", [0, 1])
     @given(st.floats(-0.02, 0.02), st.floats(-0.05, 0.05))
-    def test_the_cop_brings_the_capture_point_back_at_the_gain_asked_for(self, x, v):
+    def test_the_cop_brings_the_capture_point_back_at_the_gain_asked_for(self, axis, x, v):
         """d xi / dt = omega (xi - p) = -K xi for the linear inverted pendulum."""
         stander = Stander()
-        stander.state.com[0] += x
-        stander.state.com_velocity[0] = v
+        stander.state.com[axis] += x
+        stander.state.com_velocity[axis] = v
+        gain = (catching.CAPTURE_GAIN, catching.LATERAL_CAPTURE_GAIN)[axis]
         omega = math.sqrt(9.81 / stander.height)
         point = x + v / omega
-        cop = stander.balance().cop - FROM_ANKLE
-        if abs(cop) < catching.FARTHEST_COP:
-            assert omega * (point - cop) == pytest.approx(-catching.CAPTURE_GAIN * point, abs=1e-9)
+        balance = stander.balance()
+        cop = balance.cop[axis]
+        if abs(cop) < FARTHEST[axis]:
+            assert omega * (point - cop) == pytest.approx(-gain * point, abs=1e-9)
         else:
-            assert cop == pytest.approx(math.copysign(catching.FARTHEST_COP, point))
+            assert cop == pytest.approx(math.copysign(FARTHEST[axis], point))
+        assert balance.cop[1 - axis] == pytest.approx(0.0, abs=1e-12)
+
+    @pytest.mark.parametrize("axis", [0, 1])
+    def test_the_pull_accelerates_the_com_as_the_pendulum_does(self, stander, axis):
+        """m a = F for a = omega^2 (x - p), per normal force m g."""
+        stander.state.com[axis] += 0.005
+        balance = stander.balance()
+        omega = math.sqrt(9.81 / stander.height)
+        assert 9.81 * balance.pull[axis] == pytest.approx(omega**2 * (0.005 - balance.cop[axis]))
+        assert balance.pull[axis] < 0.0
 
     def test_a_turned_robot_is_caught_along_its_own_feet(self, stander):
         turn = pin.exp3(np.array([0.0, 0.0, 0.6]))
@@ -109,27 +114,29 @@ class TestCatch:
         for vector in (state.com, state.com_velocity, state.angular_momentum):
             vector[:] = turn @ vector
         state.sole_position = state.sole_position @ turn.T
-        np.testing.assert_allclose(stander.balance(), before, atol=1e-9)
+        after = stander.balance()
+        for field in ("cop", "pull", "momentum", "lift"):
+            np.testing.assert_allclose(getattr(after, field), getattr(before, field), atol=1e-9)
 
     def test_on_a_slope_the_com_is_above_the_soles_along_gravity(self, stander):
         angle = 0.05  # uphill in +x: gravity pulls towards -x of the floor's frame
         stander.state.gravity = np.array([-math.sin(angle), 0.0, -math.cos(angle)])
         stander.state.com[0] += stander.height * math.tan(angle)
-        assert stander.balance().cop == pytest.approx(FROM_ANKLE)
+        np.testing.assert_allclose(stander.balance().cop, 0.0, atol=1e-12)
 
     def test_momentum_counts_as_speed_unless_it_is_the_lunge(self, stander):
         stander.state.angular_momentum[1] = 0.4
-        forward = stander.balance().cop - FROM_ANKLE
+        forward = stander.balance().cop[0]
         stander.state.angular_momentum[1] = 0.0
         mass = stander.kinematics.mass
         stander.state.com_velocity[0] = catching.MOMENTUM_SHARE * 0.4 / (mass * stander.height)
-        assert stander.balance().cop - FROM_ANKLE == pytest.approx(forward)
+        assert stander.balance().cop[0] == pytest.approx(forward)
         assert forward > 0.0
         lunging = stander.catching()
         lunging.rate = 2.0
         stander.state.com_velocity[0] = 0.0
         stander.state.angular_momentum[1] = 2.0 * lunge_momentum(ROBOT)
-        cop = stander.balance(lunging).cop - FROM_ANKLE
+        cop = stander.balance(lunging).cop[0]
         # What is left is the lunge's own deceleration.
         omega = math.sqrt(9.81 / stander.height)
         slowing = (lunging.rate - 2.0) / DT
@@ -149,7 +156,7 @@ class TestCatch:
             # A displacement with the momentum of the lunge so far.
             per_joint[12] = lunge * lunge_momentum(ROBOT) / J[12]
             balance = stander.balance(kept, away=per_joint)
-            rates.append(balance.pitch_momentum / lunge_momentum(ROBOT))
+            rates.append(balance.momentum / lunge_momentum(ROBOT))
             lunge += DT * rates[-1]
         assert rates[5] * direction > 0.5
         assert max(np.abs(rates)) <= catching.FASTEST_LUNGE + 1e-9
@@ -162,24 +169,28 @@ class TestCatch:
         stander.state.base_rotation = (
             pin.exp3(np.array([0, lean, 0])) @ stander.state.base_rotation
         )
-        assert stander.balance().pitch_momentum == 0.0
+        assert stander.balance().momentum == 0.0
 
     def test_a_lunge_is_taken_back_as_far_as_the_cop_bears_it(self, stander):
         away = np.zeros(N)
         away[12] = 0.3 * lunge_momentum(ROBOT) / stander.kinematics.J_momentum[1, 12]
-        assert stander.balance(away=away).pitch_momentum < 0.0
+        assert stander.balance(away=away).momentum < 0.0
         stander.state.com[0] += 0.06  # the CoP is at its bound: a return would push forward
-        assert stander.balance(away=away).pitch_momentum >= 0.0
+        assert stander.balance(away=away).momentum >= 0.0
 
-    @pytest.mark.parametrize(("y", "sign"), [(0.01, -1.0), (-0.01, 1.0)])
-    def test_sideways_the_loads_shift(self, stander, y, sign):
+    @pytest.mark.parametrize("way", [-1.0, 1.0])
+    def test_sideways_the_loads_shift_where_the_soles_are_too_narrow(self, stander, way):
         """A CoM too far left wants load on the left: the right sole gives way, upwards."""
+        y = 0.015 * way
         stander.state.com[1] += y
         omega = math.sqrt(9.81 / stander.height)
-        cop = y * (1.0 + catching.LATERAL_CAPTURE_GAIN / omega)
-        wanted = WEIGHT * cop / stander.state.sole_position[0, 1]
-        assert stander.balance().lift == pytest.approx(catching.LOAD_GAIN * wanted)
-        assert math.copysign(1.0, stander.balance().lift) == -sign
+        shift = y * (1.0 + catching.LATERAL_CAPTURE_GAIN / omega) - FARTHEST[1] * way
+        assert shift * way > 0.0
+        balance = stander.balance()
+        wanted = WEIGHT * shift / stander.state.sole_position[0, 1]
+        assert balance.lift == pytest.approx(catching.LOAD_GAIN * wanted)
+        pull = (y - FARTHEST[1] * way - shift) / stander.height
+        assert balance.pull[1] == pytest.approx(pull)
 
     def test_a_foot_without_load_reaches_for_the_ground(self, stander):
         stander.state.foot_force = np.array([600.0, 0.0])
@@ -190,17 +201,16 @@ class TestCatch:
     def test_the_residual_moves_where_the_com_shall_be(self, stander):
         stander.state.com[:2] += [0.02, -0.01]
         balance = stander.balance(com=[0.02, -0.01, 0.0])
-        assert balance.cop == pytest.approx(FROM_ANKLE + 0.02)
-        on_right = WEIGHT * 0.01 / stander.state.sole_position[0, 1]
-        assert balance.lift == pytest.approx(-catching.LOAD_GAIN * on_right)
+        np.testing.assert_allclose(balance.cop, [0.02, -0.01])
+        assert balance.lift == pytest.approx(0.0, abs=1e-12)
 
     @pytest.mark.parametrize("way", [-1.0, 1.0])
     def test_the_cop_stays_within_the_soles_wherever_the_com_shall_be(self, stander, way):
         """Even where a residual asks for a CoM over the toes, and the capture point is beyond."""
         stander.state.com[:2] += [0.12 * way, 0.12 * way]
         balance = stander.balance(com=[0.06 * way, 0.06 * way, 0.0])
-        assert balance.cop == pytest.approx(FROM_ANKLE + catching.FARTHEST_COP * way)
-        more = WEIGHT * catching.FARTHEST_LATERAL_COP / stander.state.sole_position[0, 1]
+        np.testing.assert_allclose(balance.cop, FARTHEST * way)
+        more = WEIGHT * catching.FARTHEST_SHIFT / stander.state.sole_position[0, 1]
         assert balance.lift == pytest.approx(catching.LOAD_GAIN * more * way)
 
     def test_the_next_landing_forgets(self, stander):
@@ -210,7 +220,8 @@ class TestCatch:
             stander.balance(used)
         stander.state.com[0] -= 0.09
         used.rate = 0.0
-        assert stander.balance(used) == stander.balance()
+        stander.balance(used)
+        assert used.block.tobytes() == stander.balance().block.tobytes()
 
     def test_a_lunge_moves_neither_com_nor_feet(self, stander):
         """The smallest such motion with pitch momentum alone, by its optimality conditions."""
@@ -273,11 +284,14 @@ class TestFeedbackLanding:
     def test_ankles_are_torque_controlled_and_carry_the_cop(self):
         lander = Lander()
         lander.stander.state.foot_force = np.array([200.0, 100.0])
+        lander.stander.state.com[0] += landing.STAND_AHEAD
         command = lander.tick(0.0).command
         driven = ~np.isnan(command.torque)
         assert sorted(np.flatnonzero(driven)) == sorted(PITCH + ROLL)
         np.testing.assert_allclose(
-            command.torque[PITCH], np.array([200.0, 100.0]) * FROM_ANKLE, atol=0.7
+            command.torque[PITCH],
+            np.array([200.0, 100.0]) * (FROM_ANKLE + landing.STAND_AHEAD),
+            atol=0.7,
         )
         np.testing.assert_allclose(command.torque[ROLL], 0.0, atol=0.7)
 
@@ -324,7 +338,7 @@ class TestFeedbackLanding:
         for k in range(200):
             lander.tick(k * DT, np.array([0.02, 0.0, 0.01]))
         np.testing.assert_allclose(
-            lander.landing.setpoint.com_position[:2], [0.02, 0.0], atol=1e-5
+            lander.landing.setpoint.com_position[:2], [landing.STAND_AHEAD + 0.02, 0.0], atol=1e-5
         )
         height = lander.landing.setpoint.com_position[2]
         assert height == pytest.approx(lander.landing._stand_height + 0.01, abs=1e-5)
