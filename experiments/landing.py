@@ -57,6 +57,9 @@ AIMS: Mapping[tuple[str, str], tuple[Percent, Percent]] = MappingProxyType(
         ("push in flight", "-0.2"): (90, 95),
         ("push after landing", "-0.3"): (None, 80),
         ("push after landing", "+0.3"): (70, 80),
+        ("side push after landing", "0.4"): (None, None),
+        ("push in the launch", "-6"): (None, None),
+        ("push in the launch", "+6"): (None, None),
     }
 )
 """Must and aim of the standing rate (%) by group and label of the case."""
@@ -109,7 +112,7 @@ def render(controller: ControllerName, results: Sequence[LandingResult]) -> Tabl
     table = new_table(
         2, "", "must", "aim", "hold, %", "feedback, %", "95 %", "points", "95 %", "p",
         "force, %", "rise, cm", "limits",
-        title=f"Landings, {controller} controller, {seeds(LANDING_TEST)}",
+        title=f"Landings, {controller} controller, {seeds(LANDING_TEST[controller])}",
     )  # fmt: skip
     for result in results:
         case, ours = result.case, result.summaries[FEEDBACK]

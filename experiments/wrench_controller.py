@@ -11,12 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from icub_jump_env.compiled import compiled
-from icub_jump_env.control.catching import (
-    FARTHEST_LATERAL_COP,
-    LATERAL_CAPTURE_GAIN,
-    LOWEST_COM,
-    MOMENTUM_SHARE,
-)
+from icub_jump_env.control.catching import LOWEST_COM
 from icub_jump_env.control.command import JointCommand
 from icub_jump_env.control.config import ContactConfig, SolverName, Weights
 from icub_jump_env.control.flight import Flight

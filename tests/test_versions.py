@@ -81,9 +81,7 @@ def test_feedback_needs_the_imu(name):
 def test_it_lands_where_a_held_posture_falls(controller, disturbance):
     landed = []
     for version in VERSIONS:
-        env = gymnasium.make(
-            version, controller=controller, randomization=disturbance, stand_time=1.2
-        )
+        env = gymnasium.make(version, controller=controller, randomization=disturbance)
         env.reset(seed=0)
         terminated = False
         while not terminated:

@@ -228,7 +228,7 @@ def pose(
     else:
         tasks, aims = rows[:], target[:]
         com_scale, momentum_scale = math.sqrt(t.com_weight), math.sqrt(t.momentum_weight)
-    com_velocity(model, believed, wanted, t.com, com_scale, tasks[:3], aims[:3])  # (3b)
+    com_velocity(model, wanted, t.com, com_scale, tasks[:3], aims[:3])  # (3b)
     if aims.shape[0] > 3:
         momentum_integral(  # (3d)
             model, t.integral, wanted, t.momentum, momentum_scale, tasks[3:], aims[3:]

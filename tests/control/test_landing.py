@@ -181,7 +181,7 @@ class TestCatch:
     @pytest.mark.parametrize("way", [-1.0, 1.0])
     def test_sideways_the_loads_shift_where_the_soles_are_too_narrow(self, stander, way):
         """A CoM too far left wants load on the left: the right sole gives way, upwards."""
-        y = 0.015 * way
+        y = 0.02 * way
         stander.state.com[1] += y
         omega = math.sqrt(9.81 / stander.height)
         shift = y * (1.0 + catching.LATERAL_CAPTURE_GAIN / omega) - FARTHEST[1] * way

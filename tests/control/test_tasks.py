@@ -91,7 +91,7 @@ class Equation:
 
 EQUATIONS = {
     "(3b)": Equation(
-        lambda c, scale, *out: com_velocity(c.model, c.believed, c.asked, 7.0, scale, *out),
+        lambda c, scale, *out: com_velocity(c.model, c.asked, 7.0, scale, *out),
         lambda c, s_dot: (
             c.oracle.momentum(s_dot)[:3] / c.oracle.mass
             - (c.wanted.com_velocity - 7.0 * c.errors["com"])

@@ -102,6 +102,16 @@ def test_equals_the_textbook_form_where_no_limit_is_active(seed, momentum_contro
         previous = command
 
 
+def test_the_com_is_that_of_the_joints_with_the_feet_at_rest():
+    """Also where an estimator believes that the robot turns about the edges of its feet."""
+    standing, turning = Standing(5), Standing(5)
+    turning.state.com[:] += [0.03, -0.01, 0.005]
+    turning.state.com_velocity[:] += [0.2, 0.1, 0.0]
+    commands = [tick(controller(each), each) for each in (standing, turning)]
+    np.testing.assert_array_equal(*commands)
+    assert np.abs(commands[0]).max() > 0.0
+
+
 def test_momentum_control_off_removes_the_momentum_rows_and_nothing_else():
     """With a momentum weight of zero the full problem is the reduced one."""
     standing = Standing(7)

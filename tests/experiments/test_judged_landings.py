@@ -37,7 +37,7 @@ def test_each_aim_has_its_row(controller):
 
 def test_no_aim_is_below_its_must():
     for must, aim in AIMS.values():
-        assert (must or 0) <= aim <= 100
+        assert (must or 0) <= (100 if aim is None else aim) <= 100
 
 
 def test_what_is_printed_of_a_row():
@@ -70,5 +70,4 @@ def test_hold_and_feedback_jump_the_same_held_out_seeds(monkeypatch):
     assert jumps == CONFIGS
     assert all(SERIES in found for found in cases.values())
     assert (variants, used, jobs, resume) == (("hold", "feedback"), LANDING_TEST, 2, True)
-    assert len(used) == 200
-    assert used.start >= 6000
+    assert [len(of_seeds) for of_seeds in used.values()] == [200, 200]

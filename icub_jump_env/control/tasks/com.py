@@ -18,7 +18,6 @@ from icub_jump_env.robot.icub import GRAVITY
 @compiled
 def com_velocity(
     model: Block,
-    state: Block,
     setpoint: Block,
     gain: float,
     scale: float,
@@ -27,9 +26,12 @@ def com_velocity(
 ) -> None:
     """J_c nu = x_dot_dc - K (x - x_dc), eq. (3b).
 
+    The CoM is that of the joints with both feet at rest, as the whole of eq. 3. Where a push turns
+    the robot about the edges of its feet, the joints cannot bring the CoM back: to try it makes
+    the robot rotate.
+
     Args:
         model: Kinematics of both feet at rest.
-        state: The believed state.
         setpoint: What to track.
         gain: K (1/s).
         scale: Root of the weight (s/m).
@@ -37,7 +39,7 @@ def com_velocity(
         target: (3,) b.
     """
     for i in range(3):
-        error = state.com[i] - setpoint.com_position[i]
+        error = model.com[i] - setpoint.com_position[i]
         target[i] = scale * (setpoint.com_velocity[i] - gain * error)
         for j in range(rows.shape[1]):
             rows[i, j] = scale * model.centroidal_map[i, j]

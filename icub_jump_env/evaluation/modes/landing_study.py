@@ -127,18 +127,17 @@ def used_seeds(options: EvalOptions) -> range:
 
 def run_cases(options: EvalOptions, progress: Console) -> Results:
     """Run every case with both controllers and each variant."""
+    used = dict.fromkeys(CONTROLLERS, used_seeds(options))
     jumps = {name: options.config.for_controller(name) for name in CONTROLLERS}
     cases = {name: landing_cases(config) for name, config in jumps.items()}
-    return compare(
-        jumps, cases, list(VARIANTS), used_seeds(options), options.jobs, options.resume, progress
-    )
+    return compare(jumps, cases, list(VARIANTS), used, options.jobs, options.resume, progress)
 
 
 def compare(
     jumps: Mapping[ControllerName, JumpConfig],
     cases: Mapping[ControllerName, Sequence[LandingCase]],
     variants: Sequence[str],
-    used: range,
+    used: Mapping[ControllerName, range],
     jobs: int,
     resume: bool,
     progress: Console,
@@ -149,13 +148,13 @@ def compare(
         jumps: The configuration of each controller, which the cases change.
         cases: The cases of each controller.
         variants: Names among :data:`VARIANTS`, the paper's among them.
-        used: The seeds.
+        used: The seeds of each controller.
         jobs: Number of worker processes.
         resume: Whether to go on with existing logs.
         progress: Where the progress is shown.
     """
     series = [
-        Series(config.replace(**case.changes, **VARIANTS[variant]), used)
+        Series(config.replace(**case.changes, **VARIANTS[variant]), used[name])
         for name, config in jumps.items()
         for case in cases[name]
         for variant in variants
