@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from experiments.estimators import Truth, WatchedEnv
+from experiments.estimation_errors import Truth, WatchedEnv
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.estimation.imu import ImuEstimator
 from icub_jump_env.estimation.readings import Readings

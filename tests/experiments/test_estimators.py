@@ -11,19 +11,15 @@ import pinocchio as pin
 import pytest
 
 from experiments import estimators
-from experiments.estimators import (
+from experiments.estimation_errors import (
     ESTIMATORS,
     PHASES,
     QUANTITIES,
     Comparison,
-    EstimatorOptions,
     Motion,
-    Row,
-    conclusions,
     phases_of,
-    render,
-    run,
-)  # fmt: skip
+)
+from experiments.estimators import EstimatorOptions, Row, conclusions, render, run
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.readings import Readings
