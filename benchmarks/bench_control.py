@@ -137,6 +137,7 @@ def bench_tick(name: ControllerName, solver: SolverName, count: int) -> None:
 def bench_phases(name: ControllerName, episodes: int) -> None:
     """Print the ticks of all phases with feedback in flight and landing, estimate included."""
     env = make_env(JumpConfig.of(controller=name, stand_time=1.0, **VERSIONS["ICubJump-v1"]))
+    run_episode(env, seed=0)  # compiles
     watch = Stopwatch()
     controller, estimator = env._controller, env._estimator
     tick, estimate = controller.tick, estimator.estimate

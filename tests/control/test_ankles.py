@@ -45,7 +45,8 @@ def test_they_balance_the_ground_force_at_the_cop(robot, cop, pull):
         wrench = np.concatenate((force, np.cross(point, force)))
         expected = -(jacobian.T @ wrench)[6:]
         joints = ankle_joints(robot)[foot]
-        np.testing.assert_allclose(found[joints], expected[joints], atol=0.02 * load * 0.1)
+        # The joints' axes do not meet in the ankle: 2 mm of lever.
+        np.testing.assert_allclose(found[joints], expected[joints], atol=2e-3 * load)
 
 
 def test_a_foot_in_the_air_and_the_other_joints_are_left_alone():
