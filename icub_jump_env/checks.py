@@ -93,10 +93,9 @@ def check_action(action: Any) -> NDArray[np.float64]:
     except ValueError:  # a ragged list
         raise ActionError("action", action, allowed) from None
     numbers = array.dtype.kind in "fiu"
-    if not numbers or array.shape != (3,) or not np.isfinite(array).all():
+    if not numbers or array.shape != (3,) or not all(map(math.isfinite, values := array.tolist())):
         raise ActionError("action", action, allowed)
-    clipped: NDArray[np.float64] = np.clip(array, -1.0, 1.0).astype(np.float64)
-    return clipped
+    return np.array([min(max(value, -1.0), 1.0) for value in values], np.float64)
 
 
 def is_multiple(value: float, unit: float) -> bool:

@@ -289,7 +289,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
         simulation = self._simulation
         physics = simulation.physics
-        if physics.diverged or not physics.valid:
+        if physics.diverged:
             self._outcome = "diverged"
             return
         tick = self._controller.tick(self._state, physics.data.time, residual_target)

@@ -147,7 +147,7 @@ class JumpController:
         """
         time = self.jump_time(time)
         before, duration = self.phases.phase, self.plan.duration
-        phase = self.phases.update(time, duration, float(state.foot_force.sum()))
+        phase = self.phases.update(time, duration, sum(state.foot_force.tolist()))
         controller = self._controllers[phase]
         if phase is not before:
             controller.start(state, self.plan, time)

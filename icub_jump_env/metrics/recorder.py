@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-import numpy as np
-
 from icub_jump_env.compiled import compiled
 from icub_jump_env.linear_algebra import cholesky, solve, solve_transposed
 from icub_jump_env.metrics.jump import UNDEFINED, JumpMetrics
@@ -134,11 +132,9 @@ class JumpRecorder:
     @property
     def metrics(self) -> JumpMetrics:
         """The metrics so far; of the flights, those of the highest one."""
-        found = self.record.block[0].item()
-        values: list[Any] = [
-            _plain(value, name) for name, value in zip(JumpMetrics.__slots__, found, strict=False)
-        ]
-        return JumpMetrics(*values)
+        found = self.record.block[0].item()[: len(JumpMetrics.__slots__)]
+        values = dict(zip(JumpMetrics.__slots__, map(_plain, found), strict=True))
+        return JumpMetrics(**values | {"landed": bool(values["landed"])})
 
     @property
     def touchdown_time(self) -> float:
@@ -154,10 +150,10 @@ class JumpRecorder:
         self.record.landed = self.record.has_landed * self.record.only_feet
 
 
-def _plain(value: object, name: str) -> object:
+def _plain(value: Any) -> Any:
     if isinstance(value, float):
-        return bool(value) if name == "landed" else value if value == value else UNDEFINED
-    return tuple(_plain(entry, name) for entry in np.asarray(value).tolist())
+        return value if value == value else UNDEFINED
+    return tuple(map(_plain, value.tolist()))
 
 
 @compiled

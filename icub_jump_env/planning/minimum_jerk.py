@@ -39,6 +39,12 @@ class MinimumJerk:
 
     def sample(self, time: float) -> tuple[Array, Array]:
         """Position (rad) and velocity (rad/s) at ``time`` (s) after the start."""
-        u = min(max(time / self._duration, 0.0), 1.0)
-        done, rate = progress(u)
-        return self._start + done * self._path, rate / self._duration * self._path
+        sampled: tuple[Array, Array] = sample(time, self._duration, self._start, self._path)
+        return sampled
+
+
+@compiled
+def sample(time: float, duration: float, start: Array, path: Array) -> tuple[Array, Array]:
+    """Position and velocity ``time`` after the start, along a ``path`` of a ``duration``."""
+    done, rate = progress(min(max(time / duration, 0.0), 1.0))
+    return start + done * path, rate / duration * path

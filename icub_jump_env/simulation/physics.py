@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.compiled import compiled
 from icub_jump_env.robot.mujoco_model import build_model
 from icub_jump_env.robot.robot import Robot
 
@@ -15,7 +16,7 @@ Array = NDArray[np.float64]
 
 _MOVES = ("actuator_", "body_", "dof_", "eq_", "geom_", "jnt_", "qpos", "sensor_", "site_")
 """How fields of the model begin that say how it moves and what is measured."""
-_HUGE = 1e3
+HUGE = 1e3
 """No position (m, rad) or velocity (m/s, rad/s) of a jumping robot comes near this."""
 
 
@@ -138,15 +139,22 @@ class Physics:
     def diverged(self) -> bool:
         """Whether the simulation cannot be trusted any more.
 
-        MuJoCo resets itself when its state becomes NaN or huge, after which everything
-        is finite again; only its warnings and a clock that ran back tell.
+        Its state is not finite or huge; or it was, which MuJoCo's warnings and a clock that ran
+        back tell: MuJoCo resets itself then, after which everything is finite again.
         """
-        return self.data.time != self._last_time or bool(self.warnings.any())
+        if self.data.time != self._last_time:
+            return True
+        return not sane(self._qpos, self._qvel, self.warnings)
 
-    @property
-    def valid(self) -> bool:
-        """Whether the state is finite and small enough to compute with."""
-        return all(x.max() < _HUGE and x.min() > -_HUGE for x in (self._qpos, self._qvel))
+
+@compiled
+def sane(qpos: Array, qvel: Array, warnings: Array) -> bool:
+    """Whether a state is finite and small enough to compute with, and MuJoCo did not warn."""
+    for values in (qpos, qvel):
+        for value in values:
+            if not abs(value) < HUGE:
+                return False
+    return not warnings.any()
 
 
 def _silence_mujoco() -> None:

@@ -7,14 +7,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_count, check_number, check_type, store
-
-Array = NDArray[np.float64]
+from icub_jump_env.records import Array, Block, PerJoint, Record, Vector
 
 SensorName = Literal["ideal", "realistic"]
 
@@ -103,6 +101,20 @@ ERROR_KINDS = (
 )  # fmt: skip
 """The readings that have a :class:`SensorError`."""
 
+STREAMS: Mapping[str, int] = MappingProxyType(
+    {
+        "joint_position": 0,
+        "joint_velocity": 1,
+        "tilt": 2,
+        "gyro": 3,
+        "force": 4,
+        "moment": 5,
+        "force_gain": 6,
+        "accelerometer": 7,
+    }
+)
+"""Each has a generator of its own, so that the errors of one kind do not depend on another's."""
+
 _ENCODER_STEP = 2 * math.pi / 4096
 """The iCub's absolute joint encoders (AEA boards) resolve 12 bit per turn."""
 
@@ -133,24 +145,73 @@ SENSORS: Mapping[SensorName, SensorConfig] = MappingProxyType(
 """Sensor errors by name."""
 
 
-class ErrorSource:
-    """Draws the errors of one kind of reading.
+class Errors(Record):
+    """One number for each channel of the sensors that may err.
 
     Attributes:
-        bias: Constant offset of each channel.
-        drift: Rate (1/s) of each channel.
+        joint_position, and all others: As in :class:`SensorConfig`; of the force and the moment
+            those of the left foot first.
     """
 
-    def __init__(self, error: SensorError, size: int, rng: np.random.Generator) -> None:
-        """Draw bias and drift of ``size`` channels."""
-        self._noise = error.noise
-        self._rng = rng
-        self.bias: Array = error.bias * rng.uniform(-1.0, 1.0, size)
-        self.drift: Array = error.drift * rng.uniform(-1.0, 1.0, size)
+    joint_position: PerJoint
+    joint_velocity: PerJoint
+    tilt: Vector
+    gyro: Vector
+    accelerometer: Vector
+    force: Annotated[Array, (2, 3)]
+    moment: Annotated[Array, (2, 3)]
 
-    def at(self, time: float) -> Array:
-        """Errors of one reading at ``time`` (s) since the reset."""
-        error: Array = self.bias + self.drift * time
-        if self._noise > 0.0:
-            error += self._noise * self._rng.standard_normal(error.size)
-        return error
+
+class SensorErrors:
+    """Draws the errors of an episode.
+
+    Attributes:
+        kinds: The readings that err.
+        bias: Constant offset of each channel.
+        drift: Its rate (1/s).
+        present: The errors of the latest reading.
+    """
+
+    def __init__(self, config: SensorConfig, n_joints: int, seed: int) -> None:
+        """Draw bias and drift.
+
+        Args:
+            config: How large the errors are.
+            n_joints: How many joints there are.
+            seed: Of all errors; those of one kind do not depend on another's.
+        """
+        sizes = {"n": n_joints}
+        self.kinds = tuple(k for k in ERROR_KINDS if getattr(config, k) != SensorError())
+        self.bias, self.drift, self.present = Errors(sizes), Errors(sizes), Errors(sizes)
+        self._noise = np.zeros(AHEAD, self.bias.block.dtype)
+        self._next = AHEAD
+        self._sources: dict[str, tuple[float, np.random.Generator]] = {}
+        for kind in self.kinds:
+            error, rng = getattr(config, kind), np.random.default_rng([seed, STREAMS[kind]])
+            for largest, offset in ((error.bias, self.bias), (error.drift, self.drift)):
+                values = getattr(offset, kind)
+                values[:] = largest * rng.uniform(-1.0, 1.0, values.shape)
+            if error.noise > 0.0:
+                self._sources[kind] = error.noise, rng
+
+    def draw(self, time: float) -> Errors:
+        """The errors of one reading, ``time`` (s) after the reset; the next call overwrites them."""
+        if self._next == AHEAD:
+            for kind, (deviation, rng) in self._sources.items():
+                noise = self._noise[kind]
+                noise[:] = deviation * rng.standard_normal(noise.shape)
+            self._next = 0
+        bias, drift = _channels(self.bias.block), _channels(self.drift.block)
+        noise = _channels(self._noise[self._next : self._next + 1])
+        _channels(self.present.block)[:] = bias + drift * time + noise
+        self._next += 1
+        return self.present
+
+
+AHEAD = 50
+"""Readings for which noise is drawn at a time; it is the same as if drawn one by one."""
+
+
+def _channels(block: Block) -> Array:
+    channels: Array = block.view(np.float64)
+    return channels

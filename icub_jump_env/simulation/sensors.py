@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from typing import Any
+from typing import Annotated, Any
 
 import mujoco
 import numpy as np
 
+from icub_jump_env.compiled import compiled
 from icub_jump_env.estimation.readings import Readings
-from icub_jump_env.records import Array, Block
+from icub_jump_env.linear_algebra import add_cross, rotate_back
+from icub_jump_env.records import Array, Block, Number, PerJoint, Record, Vector
 from icub_jump_env.robot.mujoco_model import sole_geom
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import World
 from icub_jump_env.simulation.sensor_models import (
-    ERROR_KINDS,
     SENSORS,
-    ErrorSource,
+    STREAMS,
     SensorConfig,
-    SensorError,
+    SensorErrors,
 )
 
-_VIEWS = ("_imu_rotation", "_imu_gyro", "_base_velocity", "_sole_forces", "_soles")
 
-_STREAMS = (
-    "joint_position", "joint_velocity", "tilt", "gyro", "force", "moment", "force_gain",
-    "accelerometer",
-)  # fmt: skip
-"""Each has a generator of its own, so that the errors of one kind do not depend on another's."""
+class Sensing(Record):
+    """What the sensors keep between readings.
+
+    Attributes:
+        encoder_bias: (n,) error of the world's encoders (rad).
+        down: (3,) direction of gravity, world axes.
+        gravity: (3,) m/s^2, world axes.
+        velocity: (3,) of the base at the reading before, world axes (m/s).
+        time: Of the reading before (s).
+        force_gain: (2,) calibration error of the forces under the left and right foot.
+    """
+
+    encoder_bias: PerJoint
+    down: Vector
+    gravity: Vector
+    velocity: Vector
+    time: Number
+    force_gain: Annotated[Array, (2,)]
 
 
 class Sensors:
@@ -48,41 +62,30 @@ class Sensors:
         self._physics = physics
         self._config = config
         self._bind()
-        n = physics.robot.n_joints
-        self._channels = {
-            "joint_position": n,
-            "joint_velocity": n,
-            "tilt": 3,
-            "gyro": 3,
-            "accelerometer": 3,
-            "force": 6,
-            "moment": 6,
-        }
+        self._n_joints = n = physics.robot.n_joints
         self.readings = Readings.of(n)
         self.encoder_bias, self.torque_error = np.zeros(n), np.zeros(n)
-        self._world_bias = np.zeros(n)
-        self._down = np.array([0.0, 0.0, -1.0])
-        self._gravity = np.zeros(3)
-        self._last_velocity, self._last_time = np.zeros(3), 0.0
-        self._jacobian = np.zeros((6, physics.model.nv))
-        self._errors: dict[str, ErrorSource] = {}
-        self._force_gain = np.zeros(2)
+        self._sensing = Sensing({"n": n})
+        self._jacobians = np.zeros((2, 6, physics.model.nv))
+        self._errors = SensorErrors(config, n, 0)
         self._wrong_forces = False
         self._history: deque[Block] = deque(maxlen=1 + config.delay)
 
     def _bind(self) -> None:
-        data = self._physics.data
-        self._imu_rotation = data.site("imu").xmat.reshape(3, 3)
-        self._imu_gyro = data.sensor("base_gyro").data
+        physics, data = self._physics, self._physics.data
         # The IMU sits at the origin of the base.
-        self._base_velocity = data.qvel[:3]
-        self._sole_forces = [data.sensor(f"{side}_sole_force").data for side in "lr"]
-        geoms = [self._physics.model.geom(sole_geom(side)) for side in "lr"]
+        self._sources = (
+            physics.joint_position, physics.joint_velocity, data.site("imu").xmat.reshape(3, 3),
+            data.sensor("base_gyro").data, data.qvel[:3],
+        )  # fmt: skip
+        self._sole_forces = tuple(data.sensor(f"{side}_sole_force").data for side in "lr")
+        geoms = [physics.model.geom(sole_geom(side)) for side in "lr"]
         self._soles = [(data.geom_xpos[geom.id], int(geom.bodyid[0])) for geom in geoms]
 
     def __getstate__(self) -> dict[str, Any]:
         # Views of MuJoCo's arrays have to be taken anew from a copy's own data.
-        return {name: value for name, value in self.__dict__.items() if name not in _VIEWS}
+        views = ("_sources", "_sole_forces", "_soles")
+        return {name: value for name, value in self.__dict__.items() if name not in views}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -91,99 +94,160 @@ class Sensors:
     def reset(self, world: World, seed: int) -> None:
         """Draw the errors of an episode in ``world``; ``seed`` is that of all noise."""
         config = self._config.with_noise_of(SENSORS["realistic"], world.sensor_noise)
-        self._errors = {
-            kind: ErrorSource(
-                getattr(config, kind),
-                self._channels[kind],
-                np.random.default_rng([seed, _STREAMS.index(kind)]),
-            )
-            for kind in ERROR_KINDS
-            if getattr(config, kind) != SensorError()
-        }
-        rng = np.random.default_rng([seed, _STREAMS.index("force_gain")])
-        self._force_gain = config.force_gain * rng.uniform(-1.0, 1.0, 2)
-        self._wrong_forces = config.force_gain > 0.0 or not {"force", "moment"}.isdisjoint(
-            self._errors
+        self._errors = errors = SensorErrors(config, self._n_joints, seed)
+        rng = np.random.default_rng([seed, STREAMS["force_gain"]])
+        gravity = self._physics.model.opt.gravity
+        self._sensing = Sensing(
+            {"n": self._n_joints},
+            encoder_bias=world.encoder_bias,
+            down=gravity / np.linalg.norm(gravity),
+            gravity=gravity,
+            force_gain=config.force_gain * rng.uniform(-1.0, 1.0, 2),
         )
-        self.encoder_bias[:] = world.encoder_bias
-        if "joint_position" in self._errors:
-            self.encoder_bias += self._errors["joint_position"].bias
-        self._world_bias[:] = world.encoder_bias
-        gravity = self._gravity
-        gravity[:] = self._physics.model.opt.gravity
-        self._down[:] = gravity / np.linalg.norm(gravity)
-        self._last_velocity[:], self._last_time = 0.0, 0.0
+        self._wrong_forces = config.force_gain > 0.0 or not {"force", "moment"}.isdisjoint(
+            errors.kinds
+        )
+        self.encoder_bias[:] = world.encoder_bias + errors.bias.joint_position
         self._history.clear()
         self.torque_error[:] = 0.0
 
     def drawn(self) -> dict[str, Any]:
         """The errors drawn at the reset: bias and drift by kind of reading, plain floats."""
+        bias, drift = self._errors.bias, self._errors.drift
         return {
-            "force_gain": tuple(self._force_gain.tolist()),
+            "force_gain": tuple(self._sensing.force_gain.tolist()),
             **{
-                kind: {"bias": tuple(source.bias.tolist()), "drift": tuple(source.drift.tolist())}
-                for kind, source in self._errors.items()
+                kind: {
+                    "bias": tuple(getattr(bias, kind).ravel().tolist()),
+                    "drift": tuple(getattr(drift, kind).ravel().tolist()),
+                }
+                for kind in self._errors.kinds
             },
         }
 
     def read(self) -> Readings:
         """Take new readings."""
-        readings = self.readings
-        readings.joint_position[:] = self._physics.joint_position
-        readings.joint_position += self._world_bias
-        readings.joint_velocity[:] = self._physics.joint_velocity
-        np.dot(self._down, self._imu_rotation, out=readings.gravity)
-        readings.gyro[:] = self._imu_gyro
-        self._accelerate(readings)
-        for foot, force in enumerate(self._sole_forces):
-            readings.foot_force[foot] = force[3]
-        if self._errors or self._wrong_forces:
-            self._falsify(readings)
+        readings, time = self.readings.block, self._physics.data.time
+        take(time, self._sensing.block, readings, *self._sources, *self._sole_forces)
+        if self._errors.kinds or self._wrong_forces:
+            errors = self._errors.draw(time).block
+            falsify("tilt" in self._errors.kinds, errors, readings)
+            if self._wrong_forces:
+                self._find_jacobians()
+                falsify_forces(
+                    self._sensing.block, self._jacobians, *self._sole_forces, errors, readings,
+                    self.torque_error,
+                )  # fmt: skip
         if self._config.delay:
-            self._postpone(readings)
-        return readings
+            self._postpone()
+        return self.readings
 
-    def _accelerate(self, readings: Readings) -> None:
-        time = self._physics.data.time
-        passed, specific = time - self._last_time, -self._gravity
-        if passed > 0.0:
-            specific += (self._base_velocity - self._last_velocity) / passed
-        np.dot(specific, self._imu_rotation, out=readings.accelerometer)
-        self._last_velocity[:], self._last_time = self._base_velocity, time
-
-    def _falsify(self, readings: Readings) -> None:
-        time = self._physics.data.time
-        error = {kind: source.at(time) for kind, source in self._errors.items()}
-        readings.joint_position += error.get("joint_position", 0.0)
-        readings.joint_velocity += error.get("joint_velocity", 0.0)
-        readings.gyro += error.get("gyro", 0.0)
-        readings.accelerometer += error.get("accelerometer", 0.0)
-        if "tilt" in error:
-            readings.gravity += _cross(error["tilt"], readings.gravity)
-            readings.gravity /= np.linalg.norm(readings.gravity)
-        if self._wrong_forces:
-            forces = error.get("force", np.zeros(6)).reshape(2, 3)
-            moments = error.get("moment", np.zeros(6)).reshape(2, 3)
-            self._falsify_forces(readings, forces, moments)
-
-    def _falsify_forces(
-        self, readings: Readings, force_errors: Array, moment_errors: Array
-    ) -> None:
+    def _find_jacobians(self) -> None:
         model, data = self._physics.model, self._physics.data
-        self.torque_error[:] = 0.0
-        for foot, (center, body) in enumerate(self._soles):
-            force = force_errors[foot] + self._force_gain[foot] * self._sole_forces[foot][1:4]
-            readings.foot_force[foot] += force[2]
-            mujoco.mj_jac(model, data, self._jacobian[:3], self._jacobian[3:], center, body)
-            wrench = np.concatenate((force, moment_errors[foot]))
-            self.torque_error -= self._jacobian[:, 6:].T @ wrench
+        for (center, body), jacobian in zip(self._soles, self._jacobians, strict=True):
+            mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], center, body)
 
-    def _postpone(self, readings: Readings) -> None:
-        self._history.append(readings.block.copy())
-        readings.block[:] = self._history[0]
+    def _postpone(self) -> None:
+        block = self.readings.block
+        self._history.append(block.copy())
+        block[:] = self._history[0]
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """The cross product of two vectors; NumPy's takes ten times as long."""
-    (a1, a2, a3), (b1, b2, b3) = a.tolist(), b.tolist()
-    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
+@compiled
+def take(
+    time: float,
+    sensing: Block,
+    readings: Block,
+    joint_position: Array,
+    joint_velocity: Array,
+    imu_rotation: Array,
+    gyro: Array,
+    base_velocity: Array,
+    left_force: Array,
+    right_force: Array,
+) -> None:
+    """Take readings without errors, but for the world's bias of the encoders.
+
+    Args:
+        time: Of the episode (s).
+        sensing: Block of the :class:`Sensing`.
+        readings: Block of the :class:`Readings`, which this fills.
+        joint_position: (n,) rad.
+        joint_velocity: (n,) rad/s.
+        imu_rotation: (3, 3) orientation of the IMU.
+        gyro: (3,) its angular velocity, IMU axes (rad/s).
+        base_velocity: (3,) its velocity, world axes (m/s).
+        left_force: (4,) of the left sole: contacts, and the force forward, left and up (N).
+        right_force: (4,) of the right sole.
+    """
+    s, told = sensing[0], readings[0]
+    for j in range(joint_position.shape[0]):
+        told.joint_position[j] = joint_position[j] + s.encoder_bias[j]
+        told.joint_velocity[j] = joint_velocity[j]
+    told.foot_force[0], told.foot_force[1] = left_force[3], right_force[3]
+    rotate_back(imu_rotation, s.down, told.gravity)
+    passed, specific = time - s.time, -s.gravity
+    for i in range(3):
+        told.gyro[i] = gyro[i]
+        if passed > 0.0:
+            specific[i] += (base_velocity[i] - s.velocity[i]) / passed
+        s.velocity[i] = base_velocity[i]
+    rotate_back(imu_rotation, specific, told.accelerometer)
+    s.time = time
+
+
+@compiled
+def falsify(tilted: bool, errors: Block, readings: Block) -> None:
+    """Add the errors of encoders and IMU.
+
+    Args:
+        tilted: Whether the direction of gravity has one.
+        errors: Block of the :class:`icub_jump_env.simulation.sensor_models.Errors`.
+        readings: Block of the :class:`Readings`.
+    """
+    e, told = errors[0], readings[0]
+    for j in range(told.joint_position.shape[0]):
+        told.joint_position[j] += e.joint_position[j]
+        told.joint_velocity[j] += e.joint_velocity[j]
+    for i in range(3):
+        told.gyro[i] += e.gyro[i]
+        told.accelerometer[i] += e.accelerometer[i]
+    if tilted:
+        add_cross(e.tilt, told.gravity.copy(), 1.0, told.gravity)
+        x, y, z = told.gravity[0], told.gravity[1], told.gravity[2]
+        told.gravity /= math.sqrt(x * x + y * y + z * z)
+
+
+@compiled
+def falsify_forces(
+    sensing: Block,
+    jacobians: Array,
+    left_force: Array,
+    right_force: Array,
+    errors: Block,
+    readings: Block,
+    torque_error: Array,
+) -> None:
+    """Add the errors of the feet's force/torque sensors.
+
+    Args:
+        sensing: Block of the :class:`Sensing`.
+        jacobians: (2, 6, n + 6) of the middles of the soles, linear part first, world axes.
+        left_force: (4,) as of :func:`take`.
+        right_force: (4,) likewise.
+        errors: As of :func:`falsify`.
+        readings: Likewise.
+        torque_error: (n,) of the torques computed from the forces (Nm), which this sets.
+    """
+    e, gains = errors[0], sensing[0].force_gain
+    torque_error[:] = 0.0
+    for foot in range(2):
+        measured = left_force if foot == 0 else right_force
+        for i in range(3):
+            force = e.force[foot, i] + gains[foot] * measured[1 + i]
+            moment = e.moment[foot, i]
+            if i == 2:
+                readings[0].foot_force[foot] += force
+            for j in range(torque_error.shape[0]):
+                torque_error[j] -= jacobians[foot, i, 6 + j] * force
+                torque_error[j] -= jacobians[foot, 3 + i, 6 + j] * moment

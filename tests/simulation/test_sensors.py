@@ -156,7 +156,9 @@ def test_wrench_errors_reach_the_torques_through_the_transposed_jacobian(physics
     """The power of the wrench error equals that of the torque error, joint by joint."""
     made = sensors(physics, force=SensorError(bias=10.0), moment=SensorError(bias=1.0))
     made.read()
-    force, moment = (made._errors[kind].bias.reshape(2, 3) for kind in ("force", "moment"))
+    force, moment = (
+        np.array(made.drawn()[kind]["bias"]).reshape(2, 3) for kind in ("force", "moment")
+    )
     expected = np.zeros(ROBOT.n_joints)
     moved, eps = Physics(ROBOT, 0.001), 1e-6
     for joint in range(ROBOT.n_joints):
@@ -190,8 +192,9 @@ def test_force_gain_scales_the_force():
             break
     truth = readings(sensors(physics))["foot_force"]
     made = sensors(physics, force_gain=0.1)
+    gains = np.array(made.drawn()["force_gain"])
     wrong = readings(made)["foot_force"]
-    np.testing.assert_allclose(wrong, truth * (1 + made._force_gain))
+    np.testing.assert_allclose(wrong, truth * (1 + gains))
     assert abs(truth[0] - truth[1]) > 0.1  # else left and right could be swapped
     # All three components of the force count, here through the ankle's lever.
     forces = np.array([force[1:4] for force in made._sole_forces])
@@ -205,10 +208,10 @@ def test_force_gain_scales_the_force():
     assert np.abs(forces[:, :2]).max() > 1.0
     expected = -sum(
         gain * jacobian.T @ force
-        for gain, jacobian, force in zip(made._force_gain, jacobians, forces, strict=True)
+        for gain, jacobian, force in zip(gains, jacobians, forces, strict=True)
     )
     np.testing.assert_allclose(made.torque_error, expected, atol=1e-9)
-    assert (np.abs(made._force_gain) <= 0.1).all()
+    assert (np.abs(gains) <= 0.1).all()
 
 
 def test_same_seed_same_errors_and_another_seed_others(physics):

@@ -64,7 +64,6 @@ class Actuators:
             droop=droop,
             torque_command=np.nan,
         )
-        self._servoed = np.ones(robot.n_joints, dtype=bool)
 
     def reset(self, joint_position: Array, torque: Array) -> None:
         """Hold ``joint_position`` ((n,) rad) with ``torque`` ((n,) Nm)."""
@@ -72,7 +71,6 @@ class Actuators:
         drives.reference[:] = joint_position + torque / drives.stiffness
         drives.joint_torque[:] = torque
         drives.torque_control = 0.0
-        self._servoed[:] = True
         drives.velocity_command[:] = 0.0
         drives.torque_command[:] = np.nan
         drives.torque_error[:] = 0.0
@@ -82,17 +80,31 @@ class Actuators:
     def command(self, command: JointCommand) -> None:
         """Take a new command."""
         drives = self.drives
-        torque_control = command.torque is not None
-        drives.torque_control = float(torque_control)
-        drives.torque_command[:] = np.nan if command.torque is None else command.torque
-        servoed = np.isnan(drives.torque_command)
-        if torque_control and (servoed != self._servoed).any():
-            drives.loop_torque[:] = drives.joint_torque
-            drives.measured[:] = drives.joint_torque
-        self._servoed = servoed
+        if command.torque is None:
+            drives.torque_control, drives.torque_command[:] = 0.0, np.nan
+        else:
+            take_torque(command.torque, drives.block)
         drives.velocity_command[:] = 0.0 if command.velocity is None else command.velocity
         if command.position is not None:
             drives.reference[:] = command.position
+
+
+@compiled
+def take_torque(command: Array, drives: Block) -> None:
+    """Take torques to control; where others did so before, the torque loops begin anew.
+
+    Args:
+        command: (n,) joint torques (Nm), NaN for joints that stay with the servo.
+        drives: Block of the :class:`Drives`.
+    """
+    d, changed = drives[0], False
+    for j in range(command.shape[0]):
+        changed = changed or math.isnan(command[j]) != math.isnan(d.torque_command[j])
+        d.torque_command[j] = command[j]
+    d.torque_control = 1.0
+    if changed:
+        d.loop_torque[:] = d.joint_torque
+        d.measured[:] = d.joint_torque
 
 
 @compiled
