@@ -173,14 +173,23 @@ class VelocityController:
             if not solved:
                 solution, report = qp.solve(state, setpoint)
                 solved = not report.failed
-        # Keeping on is the best guess when the solver has none. The limits take the
-        # last rounding error off a solution; fmin and fmax pass over NaN limits.
-        command, problem = self._terms.previous, self.qp.problem
-        if solved:
-            command[:] = solution.x
-        np.fmin(command, problem.upper[: problem.n], out=command)
-        np.fmax(command, problem.lower[: problem.n], out=command)
+        # Keeping on is the best guess when the solver has none.
+        command = self._terms.previous
+        limit(solution.x if solved else command, self.qp.problem.block, command)
         return JointCommand(command.copy())
+
+
+@compiled
+def limit(velocity: Array, problem: Block, command: Array) -> None:
+    """Take the last rounding error off a solution, by the QP's limits, unless those are NaN."""
+    p = problem[0]
+    for j in range(command.shape[0]):
+        value = velocity[j]
+        if value > p.upper[j]:
+            value = p.upper[j]
+        if value < p.lower[j]:
+            value = p.lower[j]
+        command[j] = value
 
 
 @compiled
