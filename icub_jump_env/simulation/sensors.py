@@ -65,7 +65,7 @@ class Sensors:
         self._n_joints = n = physics.robot.n_joints
         self.readings = Readings.of(n)
         self.encoder_bias, self.torque_error = np.zeros(n), np.zeros(n)
-        self._sensing = Sensing({"n": n})
+        self._sensing = Sensing({"n": n}, down=(0.0, 0.0, -1.0))
         self._jacobians = np.zeros((2, 6, physics.model.nv))
         self._errors = SensorErrors(config, n, 0)
         self._wrong_forces = False

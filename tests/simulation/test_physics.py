@@ -152,6 +152,7 @@ def test_divergence_is_noticed_though_mujoco_resets_itself(physics, field, poiso
     thrown(physics)
     assert not physics.diverged
     getattr(physics.data, field)[10] = poison
+    assert physics.diverged
     physics.step()
     assert np.isfinite(physics.data.qpos).all()
     assert physics.diverged

@@ -12,8 +12,10 @@ from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import Randomization, draw_world
 from icub_jump_env.simulation.sensor_models import (
+    AHEAD,
     ERROR_KINDS,
     SENSORS,
+    STREAMS,
     SensorConfig,
     SensorError,
 )
@@ -64,6 +66,16 @@ def test_noise_has_the_standard_deviation_asked_for(physics):
     assert abs(errors.mean()) < 0.02
     white = np.corrcoef(errors[:-1].ravel(), errors[1:].ravel())[0, 1]
     assert abs(white) < 0.03
+
+
+def test_noise_is_as_if_drawn_one_by_one(physics):
+    made = sensors(physics, seed=5, gyro=SensorError(noise=0.3))
+    rng = np.random.default_rng([5, STREAMS["gyro"]])
+    rng.uniform(size=(2, 3))  # bias and drift
+    truth = physics.data.sensor("base_gyro").data
+    for _ in range(AHEAD + 3):
+        expected = truth + 0.3 * rng.standard_normal(3)
+        np.testing.assert_array_equal(readings(made)["gyro"], expected)
 
 
 def test_bias_is_constant_within_an_episode_and_uniform_over_episodes(physics):
