@@ -1,4 +1,4 @@
-"""Environments side by side for training, each in a worker of its own."""
+"""Environments side by side for Stable-Baselines3: each in a worker of its own, or in threads."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs
 
-from icub_jump_env.errors import InvalidValueError
+from icub_jump_env.errors import ConfigError, InvalidValueError
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.workers import end_workers, start_workers
 from icub_jump_env.policy import Policy
+from icub_jump_env.vector import ICubJumpVectorEnv
 
 from .environment import Env, EnvServer
 
@@ -87,3 +90,40 @@ class JumpVecEnv(SubprocVecEnv):
         """End the workers."""
         end_workers(self.remotes)
         self.closed = True
+
+
+class ThreadVecEnv(DummyVecEnv):
+    """Stable-Baselines3's ``DummyVecEnv`` on the threads of a vector environment."""
+
+    def __init__(self, envs: ICubJumpVectorEnv) -> None:
+        """Use a vector environment.
+
+        Args:
+            envs: Made with ``autoreset_mode="SameStep"``, as Stable-Baselines3 resets. It is
+                closed with this one.
+
+        Raises:
+            ConfigError: If it was not.
+        """
+        if envs.autoreset_mode is not AutoresetMode.SAME_STEP:
+            raise ConfigError("autoreset_mode", envs.autoreset_mode.value, "'SameStep'")
+        self._threads = envs
+        super().__init__([partial(_same, env) for env in envs.envs])
+
+    def reset(self) -> VecEnvObs:
+        """Start episodes."""
+        self._threads.forget()
+        return super().reset()
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Take the steps, (num_envs, 3) actions; ``step_wait`` returns the results."""
+        super().step_async(actions)
+        self._threads.go_ahead(actions)
+
+    def close(self) -> None:
+        """Close the vector environment."""
+        self._threads.close()
+
+
+def _same(env: Env) -> Env:
+    return env

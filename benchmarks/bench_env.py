@@ -1,7 +1,8 @@
 """Time the environment: steps per second, and where the time goes.
 
 Runs randomised episodes on one core, as a training does, with a watch around the physics, the
-models and the QP.
+models and the QP. Then several environments at once: one after the other, in threads, and each in a
+process of its own, with the same steps and turn by turn.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/bench_env.py
 """
@@ -10,14 +11,18 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import multiprocessing
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
+import gymnasium
 import numpy as np
+import psutil
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
@@ -125,14 +130,77 @@ def bench(controller: ControllerName, episodes: int) -> None:
         print(f"  {part:24s} {launch:8.1%} {episode:8.1%}")
 
 
+MODES = {"one by one": "sync", "threads": "vector_entry_point", "processes": "async"}
+"""What Gymnasium calls them."""
+
+VECTOR_STEPS = 200
+"""Steps of a round: an episode and the reset after it."""
+
+
+def make_envs(mode: str, controller: ControllerName, num_envs: int) -> gymnasium.vector.VectorEnv:
+    """A vector environment at the start of its episodes."""
+    envs = gymnasium.make_vec(
+        "ICubJump-v0",
+        num_envs=num_envs,
+        vectorization_mode=mode,
+        controller=controller,
+        randomization="hard",
+    )
+    envs.reset(seed=0)
+    return envs
+
+
+def memory(mode: str, controller: ControllerName, num_envs: int) -> tuple[float, float]:
+    """Memory of this process and its children with environments that have made some steps.
+
+    Returns:
+        Resident memory, and that without counting twice what processes share (MB).
+    """
+    envs = make_envs(mode, controller, num_envs)
+    for _ in range(10):
+        envs.step(np.zeros((num_envs, 3), np.float32))
+    this = psutil.Process()
+    used = [each.memory_full_info() for each in (this, *this.children(recursive=True))]
+    envs.close()
+    return sum(each.rss for each in used) / 1e6, sum(each.pss for each in used) / 1e6
+
+
+def bench_vector(controller: ControllerName, num_envs: int, rounds: int) -> None:
+    """Print throughput and memory of several environments, by how they are run."""
+    envs = {way: make_envs(mode, controller, num_envs) for way, mode in MODES.items()}
+    rates: dict[str, list[float]] = {way: [] for way in MODES}
+    zeros = np.zeros((num_envs, 3), np.float32)
+    for _ in range(rounds):
+        for way in MODES:
+            start = time.perf_counter()
+            for _ in range(VECTOR_STEPS):
+                envs[way].step(zeros)
+            rates[way].append(num_envs * VECTOR_STEPS / (time.perf_counter() - start))
+    for each in envs.values():
+        each.close()
+    print(f"{controller}, {num_envs} environments: steps/s, median of {rounds}, resets included")
+    # A fresh process for each: none has the others' memory.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, context, max_tasks_per_child=1) as pool:
+        for way, mode in MODES.items():
+            resident, proportional = pool.submit(memory, mode, controller, num_envs).result()
+            print(
+                f"  {way:11s} {np.median(rates[way]):5.0f}   "
+                f"{resident:5.0f} MB resident, {proportional:5.0f} MB with shared pages once"
+            )
+
+
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--episodes", type=int, default=21)
+    parser.add_argument("--num-envs", type=int, nargs="*", default=[2, 8])
     arguments = parser.parse_args()
     for controller in ("velocity", "torque"):
         bench_reset(controller, arguments.episodes)
         bench(controller, arguments.episodes)
+        for num_envs in arguments.num_envs:
+            bench_vector(controller, num_envs, arguments.episodes)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ for _name, _defaults in VERSIONS.items():
     gymnasium.register(
         id=_name,
         entry_point="icub_jump_env.env:ICubJumpEnv",
+        vector_entry_point="icub_jump_env.vector:ICubJumpVectorEnv",
         max_episode_steps=MAX_EPISODE_STEPS,
         kwargs=dict(_defaults),
     )

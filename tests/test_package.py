@@ -16,6 +16,7 @@ PACKAGE = REPOSITORY / "icub_jump_env"
 # Each layer may import itself and the layers after it.
 LAYERS = (
     ("evaluation", "cli"),
+    ("vector",),
     ("env",),
     ("policy",),
     ("config", "observation", "snapshot"),

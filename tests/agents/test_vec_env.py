@@ -1,4 +1,4 @@
-"""Environments in worker processes: the results of Stable-Baselines3, errors, clean ends."""
+"""Environments in workers and in threads: the results of Stable-Baselines3, errors, clean ends."""
 
 import contextlib
 import functools
@@ -8,17 +8,20 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import psutil
 import pytest
-from stable_baselines3.common.vec_env import DummyVecEnv
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 from tiny_run import children
 from troubled_env import TroubledEnv
 
 from agents.environment import LaunchEnv
-from agents.vec_env import JumpVecEnv
+from agents.vec_env import JumpVecEnv, ThreadVecEnv
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import InvalidValueError
+from icub_jump_env.errors import ConfigError, InvalidValueError
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.episodes.workers import WorkerError
 from icub_jump_env.policy import BASELINE
@@ -148,7 +151,7 @@ import sys
 if __name__ == "__main__":
     import numpy as np
 
-    from agents.vec_env import JumpVecEnv
+    from agents.vec_env import JumpVecEnv, ThreadVecEnv
     from troubled_env import TroubledEnv
 
     try:
@@ -191,3 +194,68 @@ def test_an_interrupt_leaves_no_process_and_no_noise(program):
     assert output.endswith("interrupted\n")
     assert errors == ""
     assert not psutil.wait_procs(started, timeout=60)[1]
+
+
+TASK = {"randomization": "hard", "stand_time": 0.0}
+
+
+class TestThreads:
+    def threads(self, num_envs=3):
+        return ThreadVecEnv(
+            gymnasium.make_vec("ICubJump-v0", num_envs=num_envs, autoreset_mode="SameStep", **TASK)
+        )
+
+    def test_the_results_are_those_of_stable_baselines3(self, rng):
+        env = self.threads()
+        reference = DummyVecEnv([functools.partial(gymnasium.make, "ICubJump-v0", **TASK)] * 3)
+        for vector in (env, reference):
+            vector.seed(5)
+        assert np.array_equal(env.reset(), reference.reset())
+        assert env.reset_infos == reference.reset_infos
+        ends = 0
+        for _ in range(160):
+            action = rng.uniform(-1, 1, (3, 3)).astype(np.float32)
+            result, expected = env.step(action), reference.step(action)
+            np.testing.assert_equal(result, expected)
+            ends += result[2].sum()
+        assert ends >= 3
+        assert env.reset_infos == reference.reset_infos
+        env.close()
+
+    def test_it_learns(self):
+        env = VecMonitor(self.threads(2))
+        model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, n_epochs=1, device="cpu")
+        model.learn(256)
+        assert model.num_timesteps == 256
+        assert len(model.ep_info_buffer) >= 1
+        env.close()
+
+    def test_it_wants_resets_in_the_last_step(self):
+        with pytest.raises(ConfigError, match="autoreset_mode"):
+            ThreadVecEnv(gymnasium.make_vec("ICubJump-v0", num_envs=1))
+
+    def test_a_plain_loop_learns(self):
+        """As CleanRL has it: tensors, no step that was a reset, one policy gradient."""
+        envs = gymnasium.make_vec("ICubJump-v0", num_envs=2, **TASK)
+        envs = gymnasium.wrappers.vector.RecordEpisodeStatistics(envs)
+        torch.manual_seed(0)
+        policy = torch.nn.Linear(*envs.single_observation_space.shape, 3)
+        before = policy.weight.detach().clone()
+        observation, lengths = torch.tensor(envs.reset(seed=0)[0]), []
+        log_probabilities, returns, over = [], torch.zeros(2), np.zeros(2, bool)
+        for _ in range(160):
+            distribution = torch.distributions.Normal(policy(observation), 0.1)
+            action = distribution.sample()
+            playing = torch.tensor(~over)
+            observed, reward, terminated, truncated, info = envs.step(action.numpy())
+            log_probabilities.append(distribution.log_prob(action).sum(1) * playing)
+            returns += torch.tensor(reward)
+            observation, over = torch.tensor(observed), terminated | truncated
+            lengths += info["episode"]["l"][over].tolist() if over.any() else []
+        (-(torch.stack(log_probabilities).sum(0) * returns).mean()).backward()
+        torch.optim.SGD(policy.parameters(), 1e-3).step()
+        assert len(lengths) >= 2
+        assert min(lengths) > 50
+        assert torch.isfinite(policy.weight).all()
+        assert not torch.equal(policy.weight, before)
+        envs.close()
