@@ -1,8 +1,8 @@
-"""Time the environment: steps per second, and where the time goes.
+"""Time the environment: what a step costs beside its physics, and where the time goes.
 
-Runs randomised episodes on one core, as a training does, with a watch around the physics, the
-models and the QP. Then several environments at once: one after the other, in threads, and each in a
-process of its own, with the same steps and turn by turn.
+Whole episodes on one core, without action. The physics are timed in the same jump through
+``mujoco.mj_step`` (``physics_loop="python"``, the same bits), the jump itself with the defaults,
+turn by turn; Gymnasium's Humanoid-v5, if its extra is there, likewise. Medians over the episodes.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/bench_env.py
 """
@@ -10,29 +10,35 @@ process of its own, with the same steps and turn by turn.
 from __future__ import annotations
 
 import argparse
-import itertools
-import multiprocessing
+import contextlib
+import subprocess
+import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import gymnasium
+import mujoco
 import numpy as np
-import psutil
 
-from icub_jump_env.config import JumpConfig
-from icub_jump_env.control.config import ControllerName
+from icub_jump_env.control.config import TorqueConfig, VelocityConfig
 from icub_jump_env.control.qp.solvers import CheckedSolver
-from icub_jump_env.env import ICubJumpEnv
-from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
+from icub_jump_env.simulation.self_collision import SelfCollision
 from icub_jump_env.simulation.sensors import Sensors
 from icub_jump_env.simulation.simulation import Simulation
+
+Env = gymnasium.Env[Any, Any]
+Make = Callable[..., Env]
+
+CONTROLLERS = ("velocity", "torque")
+HARD = {"randomization": "hard"}
+FAST = {"velocity": VelocityConfig(frequency=1000.0), "torque": TorqueConfig(frequency=1000.0)}
+"""With control at 1 kHz."""
 
 PARTS = {
     "physics, metrics": (Simulation, "run"),
@@ -40,167 +46,166 @@ PARTS = {
     "dynamics": (FeetFixedDynamics, "update"),
     "QP, solved and checked": (CheckedSolver, "solve"),
     "sensors": (Sensors, "read"),
+    "links that meet": (SelfCollision, "overlap"),
 }
 
 
-@contextmanager
-def watched(durations: dict[str, float]) -> Iterator[None]:
-    """Add up how long each part takes; parts do not contain one another."""
-    patches = [
-        patch.object(owner, name, _timed(getattr(owner, name), part, durations))
-        for part, (owner, name) in PARTS.items()
-    ]
-    for each in patches:
-        each.start()
-    try:
-        yield
-    finally:
-        for each in patches:
-            each.stop()
+class Played(NamedTuple):
+    """An episode: its steps, their wall time (s) and the time simulated (s)."""
+
+    steps: int
+    wall: float
+    simulated: float
 
 
-def _timed(
-    function: Callable[..., Any], part: str, durations: dict[str, float]
-) -> Callable[..., Any]:
-    def timed(*arguments: Any) -> Any:
+def play(env: Env, seed: int, started: Callable[[], None] = lambda: None) -> Played:
+    """Play an episode without action; ``started`` is called after the reset."""
+    env.reset(seed=seed)
+    zero = np.zeros(env.action_space.shape or (), np.float32)
+    started()
+    start = time.perf_counter()
+    steps, over = 0, False
+    while not over:
+        _, _, terminated, truncated, _ = env.step(zero)
+        steps, over = steps + 1, terminated or truncated
+    return Played(steps, time.perf_counter() - start, float(env.unwrapped.data.time))
+
+
+@contextlib.contextmanager
+def timed(owner: Any, name: str, note: Callable[[float], None]) -> Iterator[None]:
+    """Note how long each call of a function takes (s)."""
+    function = getattr(owner, name)
+
+    def call(*arguments: Any, **others: Any) -> Any:
         start = time.perf_counter()
-        result = function(*arguments)
-        durations[part] += time.perf_counter() - start
+        result = function(*arguments, **others)
+        note(time.perf_counter() - start)
         return result
 
-    return timed
+    with patch.object(owner, name, call):
+        yield
 
 
-def run(env: ICubJumpEnv, seed: int, at_takeoff: Callable[[], None]) -> int:
-    """One episode of the baseline; returns its number of steps."""
-    env.reset(seed=seed)
-    zero, launching = np.zeros(3, np.float32), True
-    for steps in itertools.count(1):
-        *_, ended, _, info = env.step(zero)
-        if launching and info["phase"] != "launch":
-            launching = False
-            at_takeoff()
-        if ended:
-            return steps
-    raise AssertionError  # unreachable: every episode ends
+def physics_of(env: Env, seed: int) -> float:
+    """Time in ``mujoco.mj_step`` (s) in an episode that calls it."""
+    durations: list[float] = []
+    with timed(mujoco, "mj_step", durations.append):
+        play(env, seed, started=durations.clear)
+    return sum(durations)
 
 
-def bench_reset(controller: ControllerName, episodes: int) -> None:
-    """Print what a reset costs with whole-body plans, with the same command and with another."""
-    env = make_env(JumpConfig(controller=controller, planner="whole_body"))
-    durations: dict[bool, list[float]] = {False: [], True: []}
+def ours(through_python: bool, **config: Any) -> Env:
+    """One of our environments; ``config`` may name another version than v0."""
+    name = config.pop("name", "ICubJump-v0")
+    loop = "python" if through_python else "compiled"
+    return gymnasium.make(name, physics_loop=loop, **config)
+
+
+def bench_step(what: str, make: Make, episodes: int) -> None:
+    """Print a line: rate, and the step beside its physics."""
+    env, observed = make(through_python=False), make(through_python=True)
+    play(env, 0), play(observed, 0)  # whatever happens once
+    found = []
     for seed in range(episodes):
-        command = 0.03 + 0.02 * seed / episodes
-        for again in (False, True):
-            start = time.perf_counter()
-            env.reset(seed=seed, options={"jump_height": command})
-            durations[again].append(1e3 * (time.perf_counter() - start))
-    same, other = np.median(durations[True]), np.median(durations[False])
-    print(f"{controller}: reset {same:.1f} ms, with a new whole-body command {other:.1f} ms")
+        played, physics = play(env, seed), physics_of(observed, seed)
+        found.append(
+            (played.steps / played.wall, played.simulated / played.wall, played.wall / physics)
+        )
+    rate, real_time, ratio = np.median(found, axis=0)
+    low, high = np.percentile([each[2] for each in found], [10, 90])
+    print(f"{what:24s} {rate:8.0f} {real_time:10.1f} {ratio:12.2f}   {low:.2f} to {high:.2f}")
 
 
-def bench(controller: ControllerName, episodes: int) -> None:
-    """Print the throughput, and the shares of the parts in the launch and in all of it."""
-    env = make_env(JumpConfig(controller=controller, randomization="hard"))
-    rates = []
+def bench_parts(controller: str, episodes: int) -> None:
+    """Print the shares of the parts, which do not contain one another, in a jump."""
+    env = ours(False, controller=controller, **HARD)
+    play(env, 0)
+    shares = []
     for seed in range(episodes):
+        durations: dict[str, float] = defaultdict(float)
+
+        def add(part: str, duration: float, durations: dict[str, float] = durations) -> None:
+            durations[part] += duration
+
+        with contextlib.ExitStack() as stack:
+            for part, (owner, name) in PARTS.items():
+                stack.enter_context(timed(owner, name, partial(add, part)))
+            wall = play(env, seed, started=durations.clear).wall
+        shares.append([durations[part] / wall for part in PARTS])
+    print(f"\n{controller}, hard, share of the time")
+    for part, share in zip(PARTS, np.median(shares, axis=0), strict=True):
+        print(f"  {part:24s} {share:6.1%}")
+    print(f"  {'the rest':24s} {1.0 - np.median(np.sum(shares, axis=1)):6.1%}")
+
+
+def milliseconds(calls: int, call: Callable[[int], object]) -> float:
+    """How long a call takes that is given its number, the median of several (ms)."""
+    durations = []
+    for number in range(calls):
         start = time.perf_counter()
-        steps = run(env, seed, at_takeoff=lambda: None)
-        rates.append(steps / (time.perf_counter() - start))
-    print(f"{controller}: {np.median(rates):.0f} steps/s, median of {episodes}, resets included")
-
-    durations: dict[str, float] = defaultdict(float)
-    shares: dict[str, list[dict[str, float]]] = {"launch": [], "episode": []}
-
-    def note(what: str) -> None:
-        wall = time.perf_counter() - start
-        parts = {part: durations[part] / wall for part in PARTS}
-        shares[what].append(parts | {"the rest, in Python": 1.0 - sum(parts.values())})
-
-    with watched(durations):
-        for seed in range(episodes):
-            durations.clear()
-            start = time.perf_counter()
-            run(env, seed, at_takeoff=lambda: note("launch"))
-            note("episode")
-    env.close()
-    print(f"  {'share of the time':24s} {'launch':>8s} {'episode':>8s}")
-    for part in shares["episode"][0]:
-        launch, episode = (np.median([s[part] for s in shares[what]]) for what in shares)
-        print(f"  {part:24s} {launch:8.1%} {episode:8.1%}")
+        call(number)
+        durations.append(1e3 * (time.perf_counter() - start))
+    return float(np.median(durations))
 
 
-MODES = {"one by one": "sync", "threads": "vector_entry_point", "processes": "async"}
-"""What Gymnasium calls them."""
+def bench_import(calls: int) -> None:
+    """Print how long the package takes to import, beside Gymnasium, which it imports."""
 
-VECTOR_STEPS = 200
-"""Steps of a round: an episode and the reset after it."""
+    def python(code: str) -> float:
+        command = [sys.executable, "-c", code]
+        return milliseconds(calls, lambda _: subprocess.run(command, check=True))
 
-
-def make_envs(mode: str, controller: ControllerName, num_envs: int) -> gymnasium.vector.VectorEnv:
-    """A vector environment at the start of its episodes."""
-    envs = gymnasium.make_vec(
-        "ICubJump-v0",
-        num_envs=num_envs,
-        vectorization_mode=mode,
-        controller=controller,
-        randomization="hard",
-    )
-    envs.reset(seed=0)
-    return envs
+    bare = python("pass")
+    package, theirs = python("import icub_jump_env") - bare, python("import gymnasium") - bare
+    print(f"\nimport: {package:.0f} ms, of which gymnasium {theirs:.0f} ms")
 
 
-def memory(mode: str, controller: ControllerName, num_envs: int) -> tuple[float, float]:
-    """Memory of this process and its children with environments that have made some steps.
+def bench_start(controller: str, calls: int) -> None:
+    """Print how long construction and resets take."""
+    make = partial(ours, False, controller=controller)
+    same, worlds, plans = make(), make(**HARD), make(name="ICubJump-v1")
+    for env in (same, worlds, plans):
+        env.reset(seed=0)
 
-    Returns:
-        Resident memory, and that without counting twice what processes share (MB).
-    """
-    envs = make_envs(mode, controller, num_envs)
-    for _ in range(10):
-        envs.step(np.zeros((num_envs, 3), np.float32))
-    this = psutil.Process()
-    used = [each.memory_full_info() for each in (this, *this.children(recursive=True))]
-    envs.close()
-    return sum(each.rss for each in used) / 1e6, sum(each.pss for each in used) / 1e6
+    def another_height(number: int) -> None:
+        plans.reset(seed=0, options={"jump_height": 0.03 + 0.02 * number / calls})
 
-
-def bench_vector(controller: ControllerName, num_envs: int, rounds: int) -> None:
-    """Print throughput and memory of several environments, by how they are run."""
-    envs = {way: make_envs(mode, controller, num_envs) for way, mode in MODES.items()}
-    rates: dict[str, list[float]] = {way: [] for way in MODES}
-    zeros = np.zeros((num_envs, 3), np.float32)
-    for _ in range(rounds):
-        for way in MODES:
-            start = time.perf_counter()
-            for _ in range(VECTOR_STEPS):
-                envs[way].step(zeros)
-            rates[way].append(num_envs * VECTOR_STEPS / (time.perf_counter() - start))
-    for each in envs.values():
-        each.close()
-    print(f"{controller}, {num_envs} environments: steps/s, median of {rounds}, resets included")
-    # A fresh process for each: none has the others' memory.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, context, max_tasks_per_child=1) as pool:
-        for way, mode in MODES.items():
-            resident, proportional = pool.submit(memory, mode, controller, num_envs).result()
-            print(
-                f"  {way:11s} {np.median(rates[way]):5.0f}   "
-                f"{resident:5.0f} MB resident, {proportional:5.0f} MB with shared pages once"
-            )
+    found = {
+        "construction": lambda _: make(),
+        "reset": lambda seed: same.reset(seed=seed),
+        "hard": lambda seed: worlds.reset(seed=seed),
+        "v1, another height": another_height,
+    }
+    told = [f"{what} {milliseconds(calls, call):.1f} ms" for what, call in found.items()]
+    print(f"{controller}: {', '.join(told)}")
 
 
 def main() -> None:
     """Run the benchmark."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--episodes", type=int, default=21)
-    parser.add_argument("--num-envs", type=int, nargs="*", default=[2, 8])
-    arguments = parser.parse_args()
-    for controller in ("velocity", "torque"):
-        bench_reset(controller, arguments.episodes)
-        bench(controller, arguments.episodes)
-        for num_envs in arguments.num_envs:
-            bench_vector(controller, num_envs, arguments.episodes)
+    episodes = parser.parse_args().episodes
+    print(f"medians of {episodes} episodes\n")
+    print(f"{'':24s}  steps/s  real time  its mj_steps   10 to 90 %")
+    for controller in CONTROLLERS:
+        cases = {
+            "": {},
+            ", hard": HARD,
+            ", v1, hard": {"name": "ICubJump-v1", **HARD},
+            ", 1 kHz, 0.5 ms": {"timestep": 0.0005, "controller": FAST[controller]},
+        }
+        for what, config in cases.items():
+            make = partial(ours, **{"controller": controller, **config})
+            bench_step(controller + what, make, episodes)
+    try:
+        bench_step("Humanoid-v5", lambda through_python: gymnasium.make("Humanoid-v5"), episodes)
+    except ImportError as error:
+        print(f"Humanoid-v5 skipped: {error}")
+    for controller in CONTROLLERS:
+        bench_parts(controller, episodes)
+    bench_import(episodes)
+    for controller in CONTROLLERS:
+        bench_start(controller, episodes)
 
 
 if __name__ == "__main__":
