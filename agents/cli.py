@@ -34,10 +34,18 @@ def _run(arguments: Sequence[str]) -> None:
     except ImportError as error:
         raise MissingDependencyError(_REMEDY) from error
     console = Console(stderr=True)
+    several = options.seeds is not None or options.cluster is not None
     try:
-        train(options, console)
+        if several:
+            from .several import train_several
+
+            train_several(options, console)
+        else:
+            train(options, console)
     except (KeyboardInterrupt, OSError, WorkerError):  # of which none is the run's fault
-        if (options.folder / OPTIONS).exists():
+        if several:
+            say(console, "the same command goes on")
+        elif (options.folder / OPTIONS).exists():
             folder = shlex.quote(str(options.folder))
             say(console, f"go on with: python train.py --resume {folder}")
         raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,7 @@ from icub_jump_env.checks import (
 )
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.episodes.cluster import Cluster
 from icub_jump_env.files import read_json
 from icub_jump_env.observation import SLICES, entry_scales
 from icub_jump_env.policy.fields import (
@@ -47,6 +49,11 @@ TASK = JumpConfig(jump_height=(0.04, 0.08), com_displacement=0.09, randomization
 SELECTION = range(10_000, 10_064)
 """Seeds of the evaluations of a training, which choose its best policy. Its own episodes draw
 theirs from 32 bits, which leaves these out but for a chance of one in a hundred thousand."""
+
+LARGEST_SEED = 2**32 - 1
+
+_RANGE = re.compile(r"(\d{1,10})\.\.(\d{1,10})", re.ASCII)
+"""The first and the last seed."""
 
 OPTIONS = "options.json"
 """File in a run's folder that says what the run was asked for."""
@@ -123,6 +130,10 @@ class TrainOptions:
         axes: Axes of the action that it uses.
         timesteps: Steps of the launch to learn from; an episode has about 35.
         seed: Seed of everything random.
+        seeds: Train with each of these seeds instead, such as 0..4, each in a folder of its own.
+            The same command goes on with what was interrupted.
+        cluster: Train on a Ray cluster, the seeds side by side: HOST:PORT of its head (extra
+            'cluster').
         jobs: Environments side by side, each in a process; the result depends on it.
         checkpoint_every: Updates between two checkpoints; with each the policy is
             evaluated.
@@ -141,6 +152,8 @@ class TrainOptions:
     axes: tuple[AxisName, ...] = ("forward", "vertical")
     timesteps: int = 100_000
     seed: int = 0
+    seeds: str | None = None
+    cluster: str | None = None
     jobs: int = 8
     checkpoint_every: int = 4
     run: Path | None = None
@@ -152,7 +165,7 @@ class TrainOptions:
         check_choice("inputs", self.inputs, ("all", "command"))
         store(self, axes=check_axes(self.axes))
         check_count("timesteps", self.timesteps, 1, 1_000_000_000, "steps")
-        check_count("seed", self.seed, 0, 2**32 - 1)
+        check_count("seed", self.seed, 0, LARGEST_SEED)
         check_count("jobs", self.jobs, 1, 1000, "processes")
         check_count("checkpoint_every", self.checkpoint_every, 1, unit="updates")
         if self.env.rendering.mode is not None:
@@ -161,8 +174,37 @@ class TrainOptions:
             raise ConfigError("jumps", self.env.jumps, "1 in a training")
         if self.ppo.episodes % self.jobs:
             raise ConfigError("jobs", self.jobs, f"a divisor of ppo.episodes={self.ppo.episodes}")
+        if self.cluster is not None:
+            Cluster(self.cluster)
+        if self.seeds is not None:
+            self._check_seeds(self.seeds)
         if self.resume is not None and self.run not in (None, self.resume):
             raise ConfigError("run", str(self.run), "not with --resume, which names it")
+
+    def _check_seeds(self, seeds: str) -> None:
+        bounds = _RANGE.fullmatch(seeds)
+        if bounds is None or not int(bounds[1]) <= int(bounds[2]) <= LARGEST_SEED:
+            raise ConfigError("seeds", seeds, "the first and the last, such as 0..4")
+        if self.seed != 0:
+            raise ConfigError("seed", self.seed, "not with --seeds")
+        if self.resume is not None:
+            raise ConfigError("resume", str(self.resume), "not with --seeds, which goes on itself")
+
+    @property
+    def trainings(self) -> list[TrainOptions]:
+        """That of each seed."""
+        alone = dataclasses.replace(self, seeds=None, cluster=None)
+        if self.seeds is None:
+            return [alone]
+        first, last = map(int, self.seeds.split(".."))
+        return [
+            dataclasses.replace(
+                alone,
+                seed=seed,
+                run=self.run and self.run.with_name(f"{self.run.name}-seed{seed}"),
+            )
+            for seed in range(first, last + 1)
+        ]
 
     @property
     def folder(self) -> Path:
@@ -181,7 +223,7 @@ class TrainOptions:
     def as_dict(self) -> dict[str, Any]:
         """What the result depends on, for JSON."""
         values = dataclasses.asdict(self)
-        for name in ("run", "resume", "config", "shortcuts"):
+        for name in ("seeds", "cluster", "run", "resume", "config", "shortcuts"):
             del values[name]
         return values
 

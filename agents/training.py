@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -60,15 +60,24 @@ LAST = "last.safetensors"
 MOST_CHECKPOINTS = 500
 """Of a run; the learning curve is in each of them, whose size is limited."""
 
-_PACKAGES = ("stable-baselines3", "torch")
+PACKAGES = ("stable-baselines3", "torch")
+"""Those on which a training depends, besides the environment's."""
 
 
-def train(options: TrainOptions, console: Console) -> None:
+def train(
+    options: TrainOptions,
+    console: Console,
+    on_checkpoint: Callable[[int], None] = lambda timesteps: None,
+) -> int:
     """Train, from the beginning or from the latest checkpoint.
 
     Args:
         options: What to train.
         console: Where to report.
+        on_checkpoint: Called with the number of steps so far, once a checkpoint is written.
+
+    Returns:
+        The number of steps at the end.
 
     Raises:
         ConfigError: If the folder holds another run, or the run had too many checkpoints.
@@ -77,20 +86,36 @@ def train(options: TrainOptions, console: Console) -> None:
         WorkerError: If a worker dies or meets an error.
         OSError: If the file system refuses.
     """
-    _check_checkpoints(options)
     folder = options.folder
-    with _named(folder), lock_run(folder):
-        words = _claim(options, console)
+    with claimed(options, console) as words:
         checkpoint = load_latest(folder, partial(say, console))
         if checkpoint is not None and checkpoint.num_timesteps >= options.timesteps:
             say(console, f"{folder} is finished")
-            return
+            return checkpoint.num_timesteps
         if checkpoint is None and options.resume is not None:
             say(console, f"no checkpoint in {folder}: starting from step 0")
         make = partial(LaunchEnv, options.env, options.input_names, options.axes)
         with contextlib.closing(JumpVecEnv([make] * options.jobs)) as env:
-            _learn(options, words, env, checkpoint, console)
+            timesteps = _learn(options, words, env, checkpoint, console, on_checkpoint)
         say(console, f"wrote {folder / BEST}")
+    return timesteps
+
+
+@contextlib.contextmanager
+def claimed(options: TrainOptions, console: Console) -> Iterator[Sequence[str]]:
+    """Keep others out of the run's folder, which holds this run or nothing.
+
+    Yields:
+        The words of the command that began the run.
+
+    Raises:
+        ConfigError: If the folder holds another run, or the run had too many checkpoints.
+        RunLockedError: If another process writes to it.
+        OSError: If the file system refuses.
+    """
+    _check_checkpoints(options)
+    with _named(options.folder), lock_run(options.folder):
+        yield _claim(options, console)
 
 
 def _check_checkpoints(options: TrainOptions) -> None:
@@ -172,7 +197,8 @@ def _learn(
     env: JumpVecEnv,
     checkpoint: Checkpoint | None,
     console: Console,
-) -> None:
+    on_checkpoint: Callable[[int], None],
+) -> int:
     model = make_model(options, env)
     folder = str(options.folder / "tensorboard")
     board = TensorBoardOutputFormat(folder)
@@ -187,7 +213,7 @@ def _learn(
     with contextlib.closing(logger), progress_display(console, *columns) as display:
         model.set_logger(logger)
         task = display.add_task("learning", total=options.timesteps)
-        run = _Run(options, words, console, display, task)
+        run = _Run(options, words, console, display, task, on_checkpoint)
         if checkpoint is not None:
             run.resume(checkpoint.number, checkpoint.progress)
             say(console, f"going on from step {model.num_timesteps} of {options.timesteps}")
@@ -197,6 +223,7 @@ def _learn(
     wall = time.monotonic() - start
     rate = (model.num_timesteps - before) / wall
     say(console, f"{wall / 60:.1f} min, {rate:.0f} steps/s, evaluations included")
+    return model.num_timesteps
 
 
 class _Run(BaseCallback):
@@ -216,6 +243,7 @@ class _Run(BaseCallback):
         console: Console,
         display: Progress,
         task: TaskID,
+        on_checkpoint: Callable[[int], None],
     ) -> None:
         super().__init__()
         self._options = options
@@ -223,6 +251,7 @@ class _Run(BaseCallback):
         self._console = console
         self._display = display
         self._task = task
+        self._on_checkpoint = on_checkpoint
         self._updates = 0
         self._number = 0
         self._curve: list[dict[str, Any]] = []
@@ -310,6 +339,7 @@ class _Run(BaseCallback):
         self._evaluate()
         progress = {"updates": self._updates, "curve": self._curve}
         save_checkpoint(self._options.folder, self.model, self._number, progress)
+        self._on_checkpoint(self.model.num_timesteps)
 
     def _begin_segment(self) -> None:
         self._seeds.append(begin_segment(self.model, self._options.seed, self._number))
@@ -352,7 +382,7 @@ class _Run(BaseCallback):
             self._options.folder / name,
             export(self.model, self._options, self._action_scale),
             config=self._options.env,
-            versions=versions(*_PACKAGES) | {SOURCE: source()},
+            versions=versions(*PACKAGES) | {SOURCE: source()},
             command=self._command,
             seed=self._options.seed,
             results={"evaluation": self._curve[-1]},

@@ -139,6 +139,7 @@ def _evaluate(arguments: Sequence[str]) -> None:
 
         check_video(options.video)
 
+    from icub_jump_env.evaluation.episodes.cluster import Cluster
     from icub_jump_env.evaluation.episodes.contender import read_contenders
     from icub_jump_env.policy import check_match
 
@@ -150,6 +151,8 @@ def _evaluate(arguments: Sequence[str]) -> None:
                 check_match(contender.card, options.config)
             except PolicyMismatchError as error:
                 raise ICubJumpError(f"{contender.name}: {error}") from error
+    if isinstance(options.workers, Cluster):
+        options.workers.connect()  # before any file is touched
     console, progress = Console(), Console(stderr=True)
     mode = importlib.import_module(f"icub_jump_env.evaluation.modes.{options.mode}")
     mode.run(options, contenders, console, progress)

@@ -12,6 +12,7 @@ import tyro
 from icub_jump_env.checks import check_count, store
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.episodes.cluster import Cluster, Jobs
 from icub_jump_env.shortcuts import Shortcuts
 from icub_jump_env.versions import EnvName
 
@@ -23,12 +24,22 @@ _MODES = ("compare", "study", "sweep", "max_height", "report", "view")
 _COMMON = ("env", "config", "shortcuts", "seed")
 _USED = {
     "nominal": ("episodes", "policy", "json", "plot", "video"),
-    "statistics": ("episodes", "policy", "jobs", "results", "resume", "json", "plot", "video"),
-    "compare": ("episodes", "jobs", "resume", "json", "plot"),
-    "study": ("episodes", "jobs", "json", "plot"),
-    "landing_study": ("episodes", "jobs", "resume", "json", "plot"),
-    "sweep": ("jobs", "json", "plot"),
-    "max_height": ("jobs", "json"),
+    "statistics": (
+        "episodes",
+        "policy",
+        "jobs",
+        "cluster",
+        "results",
+        "resume",
+        "json",
+        "plot",
+        "video",
+    ),
+    "compare": ("episodes", "jobs", "cluster", "resume", "json", "plot"),
+    "study": ("episodes", "jobs", "cluster", "json", "plot"),
+    "landing_study": ("episodes", "jobs", "cluster", "resume", "json", "plot"),
+    "sweep": ("jobs", "cluster", "json", "plot"),
+    "max_height": ("jobs", "cluster", "json"),
     "report": (),
     "view": ("policy",),
 }
@@ -64,6 +75,8 @@ class EvalOptions:
         policy: Let this policy act; the jump is set up as its card says.
         compare: Compare policies on the same episodes: files, and the word baseline.
         jobs: Processes that work in parallel.
+        cluster: Let all processors of a Ray cluster do the work: HOST:PORT of its head (extra
+            'cluster').
         study: What changes the jump: the realism of actuators and sensors, the task as cost or
             constraint, what ends the launch, the robot; how flight and landing are controlled,
             under disturbances of several sizes.
@@ -91,6 +104,7 @@ class EvalOptions:
     policy: Path | None = None
     compare: tuple[str, ...] | None = None
     jobs: int = 1
+    cluster: str | None = None
     study: Literal["realism", "constraints", "launch_end", "robots", "landing"] | None = None
     sweep: bool = False
     max_height: bool = False
@@ -108,6 +122,10 @@ class EvalOptions:
             check_count("episodes", self.episodes, 1, MOST_EPISODES)
         check_count("seed", self.seed, 0)
         check_count("jobs", self.jobs, 1, unit="processes")
+        if isinstance(self.workers, Cluster) and self.jobs != 1:
+            raise ConfigError(
+                "jobs", self.jobs, "not with --cluster, all of whose processors work"
+            )
         chosen = [mode for mode in _MODES if getattr(self, mode)]
         if len(chosen) > 1:
             raise ConfigError(chosen[0], getattr(self, chosen[0]), f"not with {_flag(chosen[1])}")
@@ -147,6 +165,11 @@ class EvalOptions:
     def seeds(self) -> range:
         """Of the episodes."""
         return range(self.seed, self.seed + (self.episodes or 1))
+
+    @property
+    def workers(self) -> Jobs:
+        """What runs the episodes."""
+        return self.jobs if self.cluster is None else Cluster(self.cluster)
 
     @property
     def mode(self) -> str:

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.episodes.cluster import Jobs
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender
 from icub_jump_env.evaluation.episodes.log import EpisodeLog
 from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
@@ -45,7 +46,7 @@ class Series:
         self,
         path: Path,
         resume: bool,
-        jobs: int,
+        jobs: Jobs,
         progress: Console,
         remedy: str = RESUME,
     ) -> list[Episode]:
@@ -54,7 +55,7 @@ class Series:
         Args:
             path: The log.
             resume: Whether to go on with an existing log.
-            jobs: Number of worker processes.
+            jobs: Number of worker processes, or a cluster.
             progress: Where the progress is shown.
             remedy: What to say of an interrupted one.
 
@@ -82,7 +83,7 @@ class Series:
         }
         return EpisodeLog(path, header, resume)
 
-    def complete(self, jobs: int, progress: Console) -> list[Episode]:
+    def complete(self, jobs: Jobs, progress: Console) -> list[Episode]:
         """All episodes; those that the default log has are not run again."""
         log = self.default_log()
         return self.run(log, log.exists(), jobs, progress, "the same command goes on there")
@@ -113,13 +114,13 @@ class Series:
 
 
 def fill(
-    logs: Sequence[tuple[Series, EpisodeLog]], jobs: int, progress: Console, remedy: str = RESUME
+    logs: Sequence[tuple[Series, EpisodeLog]], jobs: Jobs, progress: Console, remedy: str = RESUME
 ) -> list[list[Episode]]:
     """Run the episodes that the logs of some series lack, all side by side.
 
     Args:
         logs: Each series with its log.
-        jobs: Number of worker processes.
+        jobs: Number of worker processes, or a cluster.
         progress: Where the progress is shown.
         remedy: What to say of an interrupted run.
 

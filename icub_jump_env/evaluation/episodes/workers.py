@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 from icub_jump_env.errors import ICubJumpError
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Read by the linear algebra libraries when they are loaded."""
 
 _LAST_BREATH = 5.0
@@ -159,7 +159,7 @@ def _inherited_by_workers() -> Iterator[None]:
     Ctrl-C is held back here, not lost.
     """
     resource_tracker.ensure_running()  # it would let Ctrl-C through when it starts
-    added = [name for name in _THREADS if name not in os.environ]
+    added = [name for name in THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(added, "1"))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

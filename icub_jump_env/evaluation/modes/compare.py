@@ -85,7 +85,7 @@ def run_contenders(
         series = Series(options.config, options.seeds, contender)
         log = series.default_log()
         resume = options.resume and log.exists()
-        arms[contender.name] = series.run(log, resume, options.jobs, progress)
+        arms[contender.name] = series.run(log, resume, options.workers, progress)
     return arms
 
 

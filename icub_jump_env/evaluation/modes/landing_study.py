@@ -15,6 +15,7 @@ from rich.table import Table
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
+from icub_jump_env.evaluation.episodes.cluster import Jobs
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.series import Series, fill
@@ -130,7 +131,7 @@ def run_cases(options: EvalOptions, progress: Console) -> Results:
     used = dict.fromkeys(CONTROLLERS, used_seeds(options))
     jumps = {name: options.config.for_controller(name) for name in CONTROLLERS}
     cases = {name: landing_cases(config) for name, config in jumps.items()}
-    return compare(jumps, cases, list(VARIANTS), used, options.jobs, options.resume, progress)
+    return compare(jumps, cases, list(VARIANTS), used, options.workers, options.resume, progress)
 
 
 def compare(
@@ -138,7 +139,7 @@ def compare(
     cases: Mapping[ControllerName, Sequence[LandingCase]],
     variants: Sequence[str],
     used: Mapping[ControllerName, range],
-    jobs: int,
+    jobs: Jobs,
     resume: bool,
     progress: Console,
 ) -> Results:
@@ -149,7 +150,7 @@ def compare(
         cases: The cases of each controller.
         variants: Names among :data:`VARIANTS`, the paper's among them.
         used: The seeds of each controller.
-        jobs: Number of worker processes.
+        jobs: Number of worker processes, or a cluster.
         resume: Whether to go on with existing logs.
         progress: Where the progress is shown.
     """

@@ -92,7 +92,7 @@ def highest_jump(config: JumpConfig, options: EvalOptions, progress: Console) ->
     seeds = range(options.seed, options.seed + REPETITIONS)
     for member in reversed(range(len(family.rise))):
         jump = perturbed(config.replace(jump_height=float(family.rise[member])))
-        episodes = run_all([Job(jump, seed) for seed in seeds], options.jobs, progress)
+        episodes = run_all([Job(jump, seed) for seed in seeds], options.workers, progress)
         if all(episode.landed for episode in episodes):
             return Highest(family, member, Summary.of(episodes), _most_collisions(episodes))
     raise ConfigError("plans", config.plans, "a family with a plan that the robot lands with")

@@ -32,7 +32,7 @@ def run(
     warn_if_alike(options.config, progress)
     series = Series(options.config, options.seeds, contender)
     log = options.results or series.default_log()
-    episodes = series.run(log, options.resume, options.jobs, progress)
+    episodes = series.run(log, options.resume, options.workers, progress)
     asked = {"episodes": len(episodes), "policy": contender.identity}
     found = asked | Summary.of(episodes).as_dict()
 

@@ -140,7 +140,7 @@ def run_cases(study: Study, options: EvalOptions, progress: Console) -> list[Cas
                 work.append(Job(config, seed))
                 owners.append((index, controller))
     episodes: dict[tuple[int, ControllerName], list[Episode]] = {o: [] for o in owners}
-    for owner, episode in zip(owners, run_all(work, options.jobs, progress), strict=True):
+    for owner, episode in zip(owners, run_all(work, options.workers, progress), strict=True):
         episodes[owner].append(episode)
     return [
         CaseResult(case, {c: Summary.of(episodes[index, c]) for c in CONTROLLERS})

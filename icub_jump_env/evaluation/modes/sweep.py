@@ -43,7 +43,7 @@ def run(options: EvalOptions, _: Sequence[Contender], console: Console, progress
         )
         for controller, height, rise in cells
     ]
-    done = run_all(work, options.jobs, progress)
+    done = run_all(work, options.workers, progress)
     found = [
         change | {"outcome": episode.outcome, "failure": episode.failure, "jump": episode.jump}
         for change, episode in zip(changes, done, strict=True)

@@ -7,6 +7,7 @@ import functools
 import hashlib
 import platform
 import sys
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -46,11 +47,21 @@ def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
 def source() -> str:
     """Hash of the code that a jump depends on: the package without the evaluation."""
     package = Path(icub_jump_env.__file__).parent
+    files = sorted(package.rglob("*.py"))
+    return _hash(package, [file for file in files if package / "evaluation" not in file.parents])
+
+
+@functools.cache
+def content(folder: Path) -> str:
+    """Hash of all code and data in a folder: also what judges an episode, and plans."""
+    kinds = (".py", ".json", ".safetensors")
+    return _hash(folder, [file for file in sorted(folder.rglob("*")) if file.suffix in kinds])
+
+
+def _hash(folder: Path, files: Sequence[Path]) -> str:
     digest = hashlib.sha256()
-    for file in sorted(package.rglob("*.py")):
-        name = file.relative_to(package).as_posix()
-        if not name.startswith("evaluation/"):
-            digest.update(name.encode() + file.read_bytes())
+    for file in files:
+        digest.update(file.relative_to(folder).as_posix().encode() + file.read_bytes())
     return digest.hexdigest()[:16]
 
 
