@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import dataclasses
 import io
@@ -18,7 +19,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
 from icub_jump_env.evaluation.episodes.cluster import (
+    RETRIES,
     Cluster,
+    LostError,
     check_plans,
     check_same,
     fetch,
@@ -89,12 +92,10 @@ def _train_on_cluster(runs: list[TrainOptions], cluster: Cluster, console: Conso
         display = stack.enter_context(progress_display(console, *columns))
         task = display.add_task("learning", total=sum(run.timesteps for run in runs))
         done = dict.fromkeys((run.folder for run in runs), 0)
+        lost: collections.Counter[Path] = collections.Counter()
         try:
             for run in runs:
-                asked = pickle.dumps((run, _files(run.folder)))
-                cpus = min(run.jobs, _largest_node())
-                stream = remote(_train_on_node, cpus=cpus).remote(_fingerprint(), asked)
-                streams[stream] = run
+                streams[_begin(run)] = run
             while streams:
                 (stream,), _ = ray.wait(list(streams), num_returns=1)
                 run = streams[stream]
@@ -104,6 +105,10 @@ def _train_on_cluster(runs: list[TrainOptions], cluster: Cluster, console: Conso
                     del streams[stream]
                     continue
                 except WorkerError as error:
+                    lost[run.folder] += 1
+                    if isinstance(error, LostError) and lost[run.folder] <= RETRIES:
+                        streams[_begin(run)] = streams.pop(stream)
+                        continue
                     raise WorkerError(f"{run.folder}: {error}") from error
                 _write(run.folder, snapshot.files)
                 for line in snapshot.said:
@@ -113,6 +118,13 @@ def _train_on_cluster(runs: list[TrainOptions], cluster: Cluster, console: Conso
         finally:
             for stream in streams:
                 give_up(stream)
+
+
+def _begin(run: TrainOptions) -> Any:
+    """The stream of snapshots of a training that begins, or goes on from the files here."""
+    # Ray would begin again with the files of now, not with those of the latest checkpoint.
+    task = remote(_train_on_node, min(run.jobs, _largest_node()), retries=0)
+    return task.remote(_fingerprint(), pickle.dumps((run, _files(run.folder))))
 
 
 def _largest_node() -> int:
@@ -134,8 +146,7 @@ def _train_on_node(theirs: Mapping[str, str], asked: bytes) -> Iterator[Snapshot
         asked: Pickled: the options of a run that has been claimed, and its files.
 
     Yields:
-        A snapshot for each checkpoint, and one at the end. Where Ray repeats a training whose
-        node was lost, it knows those that it has had.
+        A snapshot for each checkpoint, and one at the end.
     """
     check_same(_fingerprint(), theirs)
     run, files = pickle.loads(asked)

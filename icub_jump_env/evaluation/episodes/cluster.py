@@ -44,6 +44,10 @@ class ClusterError(ICubJumpError, RuntimeError):
     """There is no cluster at an address, it cannot be joined, or has no processors."""
 
 
+class LostError(WorkerError):
+    """The process of a task died, or its node did."""
+
+
 class OtherCodeError(ClusterError):
     """A node has other code or other versions of packages than this process."""
 
@@ -145,7 +149,7 @@ class Slot:
     def send(self, request: Any) -> None:
         """Hand over a request."""
         asked = pickle.dumps((self._make_server, request))
-        self._task = remote(_answer, cpus=1).remote(fingerprint(), asked)
+        self._task = remote(_answer, 1, RETRIES).remote(fingerprint(), asked)
 
     def recv(self) -> Any:
         """Wait for the answer.
@@ -177,11 +181,17 @@ class Slot:
 
 
 @functools.cache  # else Ray would send the function to the nodes again and again
-def remote(function: Callable[..., Any], cpus: int) -> Any:
-    """A function that runs on the cluster, where it takes up so many processors of a node."""
+def remote(function: Callable[..., Any], cpus: int, retries: int) -> Any:
+    """A function that runs on the cluster.
+
+    Args:
+        function: What runs.
+        cpus: How many processors of a node it takes up.
+        retries: How often Ray begins again where it was lost.
+    """
     import ray
 
-    return ray.remote(num_cpus=cpus, max_retries=RETRIES)(function)
+    return ray.remote(num_cpus=cpus, max_retries=retries)(function)
 
 
 def fetch(task: ray.ObjectRef[Any]) -> Any:
@@ -189,7 +199,8 @@ def fetch(task: ray.ObjectRef[Any]) -> Any:
 
     Raises:
         OtherCodeError: If it would come from other code.
-        WorkerError: If the task meets an error, or its process dies again and again.
+        WorkerError: If the task meets an error.
+        LostError: If its process died, each time that Ray tried.
     """
     import ray
 
@@ -201,7 +212,7 @@ def fetch(task: ray.ObjectRef[Any]) -> Any:
         reason = f"{type(error.cause).__name__}: {error.cause}"
         raise WorkerError(f"a worker of the cluster failed: {reason}") from error
     except ray.exceptions.RayError as error:
-        raise WorkerError(f"a worker of the cluster died: {error}") from error
+        raise LostError(f"a worker of the cluster died: {error}") from error
 
 
 def give_up(task: Any) -> None:
