@@ -44,7 +44,7 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
     side end theirs together; the step that ends it brings the rewards of flight and
     landing, too. If the jump is over before, the remaining steps do and cost nothing.
     Agents see some entries of the observation and use some axes of the action; the others
-    are zero.
+    are zero. Episodes end early (:mod:`icub_jump_env.metrics.foresight`).
     """
 
     def __init__(self, config: JumpConfig, inputs: Sequence[str], axes: Sequence[str]) -> None:
@@ -55,7 +55,7 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
             inputs: Names of the entries of the observation that the agent sees.
             axes: Axes of the action that it uses.
         """
-        self.env: ICubJumpEnv = make_env(config)
+        self.env: ICubJumpEnv = make_env(config.replace(early_end=True))
         entries = list(entry_scales())
         self._columns = [entries.index(name) for name in inputs]
         self._axes = [AXES.index(axis) for axis in axes]

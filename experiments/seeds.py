@@ -6,7 +6,7 @@ from types import MappingProxyType
 from agents.options import SELECTION
 from icub_jump_env.control.config import ControllerName
 
-__all__ = ["LANDING_TEST", "PLANNER_TEST", "SELECTION", "TEST", "TUNING"]
+__all__ = ["FORESIGHT_TEST", "LANDING_TEST", "PLANNER_TEST", "SELECTION", "TEST", "TUNING"]
 
 TUNING = range(200)
 """Tuned the controllers; choose constants, mean actions and the strongest baselines."""
@@ -30,3 +30,6 @@ LANDING_TEST: Mapping[ControllerName, range] = MappingProxyType(
 The velocity controller was changed after both had been judged on the seeds of the torque controller,
 of which no bit changed.
 """
+
+FORESIGHT_TEST = range(5300, 5425)
+"""Held out from everything that chose when an episode may end early."""

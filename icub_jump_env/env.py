@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import gymnasium
@@ -21,6 +22,7 @@ from icub_jump_env.estimation.imu import ImuEstimator
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.metrics.series import SeriesRecorder
 from icub_jump_env.planning.plan import JumpPlan
+from icub_jump_env.planning.residual import RESIDUAL_TIME
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot.collision import TOLERANCE
 from icub_jump_env.robot.frames import mujoco_qpos
@@ -314,12 +316,20 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         height, *more = self._heights[begun:]
         rest = REST if more else None
         truth = self._simulation.truth.read()
-        self._series.begin(height, plan.duration, truth, time, rest)
+        self._series.begin(
+            height, plan.duration, truth, time, rest, self._foreseen_from(plan.duration)
+        )
         self._estimator.reset()
         self._sense()
         self._start_com[:] = self._state.com
         following = self._planner.plan(more[0]) if more else None
         self._controller.start(plan, self._state, time, following)
+
+    def _foreseen_from(self, duration: float) -> float:
+        """From when on the outcome may be foreseen (s of the jump): not while a residual acts."""
+        if not self.config.success.early_end:
+            return math.inf
+        return duration + RESIDUAL_TIME if self.config.residual.phases == "all" else duration
 
     def _look_for_overlap(self) -> None:
         data = self._simulation.physics.data

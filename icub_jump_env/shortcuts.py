@@ -32,6 +32,7 @@ class Shortcuts:
         residual_bandwidth: Natural frequency of the filter that shapes the residual (rad/s).
         residual_phases: Whether the residual acts in the launch alone or in all phases.
         stand_time: How long the robot must stand after touch-down (s).
+        early_end: End an episode as soon as it is known whether the robot will stand.
         render_mode: None, rgb_array or human.
         width: Of a picture (pixels).
         height: Of a picture (pixels).
@@ -47,6 +48,7 @@ class Shortcuts:
     residual_bandwidth: float | None = None
     residual_phases: ResidualPhases | None = None
     stand_time: float | None = None
+    early_end: bool | None = None
     render_mode: RenderMode | None = None
     width: int | None = None
     height: int | None = None
@@ -64,6 +66,7 @@ PATHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "residual_bandwidth": ("residual", "bandwidth"),
         "residual_phases": ("residual", "phases"),
         "stand_time": ("success", "stand_time"),
+        "early_end": ("success", "early_end"),
         "render_mode": ("rendering", "mode"),
         "width": ("rendering", "width"),
         "height": ("rendering", "height"),

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from icub_jump_env.checks import check_number, store
+from icub_jump_env.checks import check_flag, check_number, store
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,9 @@ class SuccessConfig:
         flight_time: Least time in the air (s).
         height_ratio: Least CoM rise in flight, as a share of the commanded height.
         stand_time: How long the robot must stand after touch-down (s).
+        early_end: End an episode as soon as it is known whether the robot will stand
+            (:mod:`icub_jump_env.metrics.foresight`); ``landed`` and the outcome are what is
+            foreseen, and what is measured until the end ends there.
 
     Raises:
         ConfigError: If a value is out of range.
@@ -25,11 +28,13 @@ class SuccessConfig:
     flight_time: float = 0.1
     height_ratio: float = 0.7
     stand_time: float = 2.0
+    early_end: bool = False
 
     def __post_init__(self) -> None:
         store(self, flight_time=check_number("flight_time", self.flight_time, 0.0, 1.0, "s"))
         store(self, height_ratio=check_number("height_ratio", self.height_ratio, 0.0, 2.0))
         store(self, stand_time=check_number("stand_time", self.stand_time, 0.0, 30.0, "s"))
+        store(self, early_end=check_flag("early_end", self.early_end))
 
 
 class _Undefined(float):

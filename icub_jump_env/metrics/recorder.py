@@ -38,6 +38,7 @@ class JumpRecord(Record):
         has_landed: Whether the robot stood long enough at some time.
         has_footholds: Whether it is known where the soles stood.
         footholds: (2, 2) where they did, forward and left (m).
+        restless: When the robot was last not calm, since the start (s).
         flying: Whether a spell in the air goes on; of it are all that follow.
         flight_start: Loss of ground contact, since the start (s).
         flight_start_height: CoM height then (m).
@@ -78,6 +79,7 @@ class JumpRecord(Record):
     has_landed: Number
     has_footholds: Number
     footholds: Annotated[Array, (2, 2)]
+    restless: Number
     flying: Number
     flight_start: Number
     flight_start_height: Number
@@ -170,7 +172,7 @@ def begin(start: float, rest: float, record: Block) -> None:
     r.start, r.rest = start, rest
     r.landing_force = r.last_time = r.touchdown_time = math.nan
     r.best_apex = -math.inf
-    r.only_feet = 1.0
+    r.only_feet, r.restless = 1.0, 0.0
     r.has_landed = r.has_footholds = r.flying = 0.0
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from icub_jump_env.compiled import compiled
+from icub_jump_env.metrics.foresight import foresee
 from icub_jump_env.metrics.jump import JumpMetrics, SuccessConfig
 from icub_jump_env.metrics.recorder import AIRBORNE_FORCE, JumpRecorder, has_stood
 from icub_jump_env.metrics.state import TrueState
@@ -35,10 +36,14 @@ class Rules(Record):
     Attributes:
         takeoff_time: T of the present jump (s).
         is_last: Whether no jump follows: 0 or 1.
+        foreseen_from: From when on the outcome may be foreseen (s of the jump).
+        last_push: When the last push so far ends (s of the episode).
     """
 
     takeoff_time: Number
     is_last: Number
+    foreseen_from: Number
+    last_push: Number
 
 
 class Jump(NamedTuple):
@@ -81,6 +86,7 @@ class SeriesRecorder:
     def reset(self) -> None:
         """An episode begins."""
         self._heights, self.ended = [], []
+        self.rules.last_push = 0.0
 
     @property
     def begun(self) -> int:
@@ -104,6 +110,7 @@ class SeriesRecorder:
         state: TrueState,
         time: float,
         rest: float | None,
+        foreseen_from: float,
     ) -> None:
         """A jump begins, and the one before is over.
 
@@ -114,6 +121,8 @@ class SeriesRecorder:
             time: Time since the start of the episode (s).
             rest: How long the robot stands before the next crouch (s); ``None`` in the last
                 jump.
+            foreseen_from: From when on the outcome of the last jump may be foreseen (s of the
+                jump); infinity if it never is.
         """
         if self._heights:
             self.present.conclude()
@@ -122,7 +131,9 @@ class SeriesRecorder:
             self._start[:] = _between_the_feet(state)
         self._heights.append(height)
         self.present.reset(time, rest)
-        self.rules.takeoff_time, self.rules.is_last = takeoff_time, float(self.is_last)
+        rules = self.rules
+        rules.takeoff_time, rules.is_last = takeoff_time, float(self.is_last)
+        rules.foreseen_from = foreseen_from if self.is_last else math.inf
 
     @property
     def blocks(self) -> tuple[Block, Block, Block]:
@@ -192,6 +203,11 @@ def judge(state: Block, rules: Block, record: Block) -> int:
     if r.is_last and has_stood(jump):
         return STOOD
     time = s.time - jump.start
+    if r.foreseen_from < math.inf:
+        verdict = foresee(s, time, jump)
+        if verdict != 0 and time >= r.foreseen_from and s.time >= r.last_push:
+            jump.landed = 1.0 if verdict > 0 else 0.0
+            return STOOD if verdict > 0 else FELL
     airborne = s.ground_force < AIRBORNE_FORCE
     late = time >= r.takeoff_time + TAKEOFF_GRACE
     if late and not airborne and math.isnan(jump.takeoff_time):

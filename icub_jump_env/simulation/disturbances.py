@@ -107,6 +107,11 @@ class Disturbances:
             start = now + world.landing_push_time
             self._push(world.landing_push, world.landing_push_direction, start)
 
+    @property
+    def last_push(self) -> float:
+        """When the last push so far ends (s)."""
+        return float(self.awaited.pushes[:, 1].max())
+
     def _push(self, impulse: float, direction: float, start: float) -> None:
         if impulse != 0.0:
             force = impulse / PUSH_DURATION

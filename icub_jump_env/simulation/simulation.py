@@ -168,6 +168,7 @@ class Simulation:
             noticed = reason == EVENT
             if noticed:
                 self._disturbances.happen()
+                series.rules.last_push = self._disturbances.last_push
                 reason = RUNNING
         if physics.diverged:
             return "diverged"

@@ -17,7 +17,9 @@ def test_tuning_selection_test_and_training_share_no_episode():
         for number in range(MOST_CHECKPOINTS)
         for seed in segment_seeds(run, number, jobs)
     }
-    held_out = (seeds.TEST, seeds.PLANNER_TEST, *seeds.LANDING_TEST.values())
+    held_out = (
+        seeds.TEST, seeds.PLANNER_TEST, seeds.FORESIGHT_TEST, *seeds.LANDING_TEST.values(),
+    )  # fmt: skip
     uses = [set(seeds.TUNING), *map(set, held_out), set(seeds.SELECTION), training]
     for one, other in itertools.combinations(uses, 2):
         assert not one & other
