@@ -28,7 +28,7 @@ STEPS = 200
 def make_envs(mode: str, controller: str, num_envs: int) -> gymnasium.vector.VectorEnv:
     """A vector environment at the start of its episodes."""
     envs = gymnasium.make_vec(
-        "ICubJump-v0",
+        "icub_jump_env:ICubJump-v0",
         num_envs=num_envs,
         vectorization_mode=mode,
         controller=controller,

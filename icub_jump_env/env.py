@@ -230,6 +230,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         target = action64 * self._residual_scale
         self._report = IDLE
         already_over, before = self._outcome != "running", self._series.begun
+        if self._simulation.physics.diverged:
+            self._outcome = "diverged"
         for _ in range(self.config.controls_per_step):
             if self._outcome == "running":
                 self._control_tick(target)
@@ -291,9 +293,6 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
         simulation = self._simulation
         physics = simulation.physics
-        if physics.diverged:
-            self._outcome = "diverged"
-            return
         tick = self._controller.tick(self._state, physics.data.time, residual_target)
         if tick.report is not None:
             self._report = worse(self._report, tick.report)

@@ -33,29 +33,32 @@ def rotate_back(R: Array, v: Array, out: Array) -> None:
 
 
 @compiled
-def add_rows(factors: Array, rows: Array, first: int, out: Array) -> None:
+def add_rows(sign: float, factors: Array, rows: Array, first: int, out: Array) -> None:
     """Add rows times their factors, one after the other.
 
     Four at a time, as it costs more to read and write ``out`` than to calculate.
 
     Args:
+        sign: Of all factors, 1 or -1.
         factors: (k,) of the first k rows.
         rows: (k or more, m) of which the columns from ``first`` on count.
         first: Index.
         out: (n,) to which this adds the n entries of each row.
     """
-    k, n = len(factors), len(out)
+    # Of an unsigned index it is clear that it does not count from the end.
+    start, n, k = np.uintp(first), np.uintp(len(out)), len(factors)
     whole = k - k % 4
     for i in range(0, whole, 4):
-        f0, f1, f2, f3 = factors[i], factors[i + 1], factors[i + 2], factors[i + 3]
-        r0, r1 = rows[i, first:], rows[i + 1, first:]
-        r2, r3 = rows[i + 2, first:], rows[i + 3, first:]
+        f0, f1 = sign * factors[i], sign * factors[i + 1]
+        f2, f3 = sign * factors[i + 2], sign * factors[i + 3]
         for j in range(n):
-            out[j] = (((out[j] + f0 * r0[j]) + f1 * r1[j]) + f2 * r2[j]) + f3 * r3[j]
+            c = start + j
+            two = (out[j] + f0 * rows[i, c]) + f1 * rows[i + 1, c]
+            out[j] = (two + f2 * rows[i + 2, c]) + f3 * rows[i + 3, c]
     for i in range(whole, k):
-        factor, row = factors[i], rows[i, first:]
+        factor = sign * factors[i]
         for j in range(n):
-            out[j] += factor * row[j]
+            out[j] += factor * rows[i, start + j]
 
 
 @compiled
@@ -70,14 +73,11 @@ def cholesky(A: Array, U: Array) -> bool:
         Whether A is positive definite; else U is of no use.
     """
     n = A.shape[0]
-    factors = np.empty(n)
     for i in range(n):
         row = U[i, i:n]
         for j in range(n - i):
             row[j] = A[i, i + j]
-        for k in range(i):
-            factors[k] = -U[k, i]
-        add_rows(factors[:i], U, i, row)
+        add_rows(-1.0, U[:i, i], U, i, row)
         if not row[0] > 0.0:
             return False
         scale = 1.0 / math.sqrt(row[0])
@@ -100,14 +100,11 @@ def solve_transposed(U: Array, b: Array) -> None:
 @compiled
 def solve_columns_transposed(U: Array, B: Array) -> None:
     """Replace B, (n, k), by U^-T B."""
-    n = B.shape[0]
-    factors = np.empty(n)
-    for i in range(n):
-        for k in range(i):
-            factors[k] = -U[k, i]
-        add_rows(factors[:i], B, 0, B[i])
+    for i in range(B.shape[0]):
+        row = B[i]
+        add_rows(-1.0, U[:i, i], B, 0, row)
         for j in range(B.shape[1]):
-            B[i, j] /= U[i, i]
+            row[j] /= U[i, i]
 
 
 @compiled

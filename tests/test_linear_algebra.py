@@ -67,8 +67,10 @@ def test_triangular_systems_are_solved(seed, n):
     np.testing.assert_allclose(U.T @ X, B, atol=1e-9)
 
 
-@given(seeds, st.integers(0, 9), st.integers(1, 6), st.integers(0, 5))
-def test_rows_are_added_one_after_the_other(seed, k, n, first):
+@given(
+    seeds, st.sampled_from((1.0, -1.0)), st.integers(0, 9), st.integers(1, 6), st.integers(0, 5)
+)
+def test_rows_are_added_one_after_the_other(seed, sign, k, n, first):
     """Whether some are taken together or not, in the order in which a plain loop adds them."""
     rng = np.random.default_rng(seed)
     factors, rows, out = (
@@ -78,8 +80,8 @@ def test_rows_are_added_one_after_the_other(seed, k, n, first):
     )
     expected = out.copy()
     for factor, row in zip(factors, rows[:k], strict=True):
-        expected += factor * row[first:]
-    add_rows(factors, rows, first, out)
+        expected += sign * factor * row[first:]
+    add_rows(sign, factors, rows, first, out)
     np.testing.assert_array_equal(out, expected)
 
 

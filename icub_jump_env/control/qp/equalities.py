@@ -72,7 +72,7 @@ def solve_equalities(problem: Block, solution: Block) -> bool:
             multipliers[a] += columns[j, a] * gradient
     for a in range(e):
         multipliers[a] = -multipliers[a]
-        add_rows(columns[:, a], columns, a, schur[a, a:])
+        add_rows(1.0, columns[:, a], columns, a, schur[a, a:])
     if not cholesky(schur, schur):
         return False
     solve_transposed(schur, multipliers)

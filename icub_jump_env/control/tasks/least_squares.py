@@ -26,6 +26,6 @@ def least_squares(
             gradient[i] -= rows[row, i] * target[row]
         hessian[i, i:] = 0.0
         hessian[i, i] = diagonal[i]
-        add_rows(rows[:, i], rows, i, hessian[i, i:])
+        add_rows(1.0, rows[:, i], rows, i, hessian[i, i:])
         for j in range(i):
             hessian[i, j] = hessian[j, i]
