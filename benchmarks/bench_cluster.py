@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import argparse
 import copy
+import multiprocessing
 import os
 import pickle
 import tempfile
 import time
 import tracemalloc
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -23,7 +25,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.cluster import Cluster, Jobs, Slot
 from icub_jump_env.evaluation.episodes.log import EpisodeLog
 from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
-from icub_jump_env.evaluation.episodes.rollout import Episode
+from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
 
 JUMP = JumpConfig(randomization="hard")
 
@@ -40,6 +42,19 @@ def bench_jumps(jobs: Jobs, workers: int, episodes: int) -> tuple[float, float]:
     # As many as there are workers come with the first.
     rest = ends[workers:]
     return ends[0] - start, len(rest) / (rest[-1] - ends[workers - 1]) / workers
+
+
+def jump_by_itself(seed: int) -> Episode:
+    """An episode with an environment of its own."""
+    return run_episode(make_env(JUMP), seed)
+
+
+def bench_plain_pool(workers: int) -> float:
+    """How long the first jump takes (s) in a pool that does nothing else."""
+    start, context = time.perf_counter(), multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context) as pool:
+        wait([pool.submit(jump_by_itself, seed) for seed in range(workers)], None, FIRST_COMPLETED)
+        return time.perf_counter() - start
 
 
 def bench_asking(episode: Episode, slots: int, requests: int) -> tuple[float, float]:
@@ -86,12 +101,14 @@ def bench(repetitions: int, episodes: int) -> None:
     ((_, episode),) = run_jobs([Job(JUMP, 0)], 1)
     firsts: dict[str, list[float]] = {"local processes": [], "a running cluster": []}
     rates: dict[str, list[float]] = {name: [] for name in firsts}
+    plain: list[float] = []
     for _ in range(repetitions):
         for name, jobs in zip(firsts, (workers, cluster), strict=True):
             first, rate = bench_jumps(jobs, workers, episodes)
             firsts[name].append(first)
             rates[name].append(rate)
             ray.shutdown()  # the next repetition joins anew, with new processes
+        plain.append(bench_plain_pool(workers))
     cluster.connect()
     asking = [
         bench_asking(episode, slots=2 * CORES[-1], requests=5000) for _ in range(repetitions)
@@ -102,6 +119,7 @@ def bench(repetitions: int, episodes: int) -> None:
 
     print(f"{workers} processors, medians of {repetitions} runs of {episodes} jumps (hard)\n")
     print(f"{'':20s} {'first jump, s':>14s} {'then, jumps/s and processor':>28s}")
+    print(f"{'a plain pool':20s} {median(plain):14.1f}")
     for name in firsts:
         print(f"{name:20s} {median(firsts[name]):14.1f} {median(rates[name]):28.2f}")
     print(f"\nthe process that asks hands out, takes in and logs at most {most:.0f} jumps/s;")

@@ -149,7 +149,7 @@ def milliseconds(calls: int, call: Callable[[int], object]) -> float:
 
 
 def bench_import(calls: int) -> None:
-    """Print how long the package takes to import, beside Gymnasium, which it imports."""
+    """Print how long a new process takes to import the package, and to its first episode."""
 
     def python(code: str) -> float:
         command = [sys.executable, "-c", code]
@@ -157,7 +157,11 @@ def bench_import(calls: int) -> None:
 
     bare = python("pass")
     package, theirs = python("import icub_jump_env") - bare, python("import gymnasium") - bare
-    print(f"\nimport: {package:.0f} ms, of which gymnasium {theirs:.0f} ms")
+    first = python("import gymnasium; gymnasium.make('icub_jump_env:ICubJump-v1').reset()") - bare
+    print(
+        f"\nimport: {package:.0f} ms, of which gymnasium {theirs:.0f} ms; "
+        f"to the first episode: {first:.0f} ms"
+    )
 
 
 def bench_start(controller: str, calls: int) -> None:

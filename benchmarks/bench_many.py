@@ -66,7 +66,7 @@ def bench(controller: str, num_envs: int, rounds: int) -> None:
             rates[way].append(num_envs * STEPS / (time.perf_counter() - start))
     for each in envs.values():
         each.close()
-    print(f"{controller}, {num_envs} environments, hard")
+    print(f"{controller}, {num_envs} {'environment' if num_envs == 1 else 'environments'}, hard")
     # A fresh process for each: none has the others' memory.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, context, max_tasks_per_child=1) as pool:

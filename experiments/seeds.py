@@ -31,5 +31,9 @@ The velocity controller was changed after both had been judged on the seeds of t
 of which no bit changed.
 """
 
-FORESIGHT_TEST = range(5300, 5425)
-"""Held out from everything that chose when an episode may end early."""
+FORESIGHT_TEST = range(5425, 5550)
+"""Held out from everything that chose when an episode may end early.
+
+Seeds 5300 to 5424 judged an earlier rule, of which 12 verdicts in 1000 were wrong; the present one was
+chosen on them and on the tuning seeds.
+"""

@@ -10,16 +10,18 @@ from icub_jump_env.robot.icub import GRAVITY
 
 EARLIEST = 0.2
 """Nothing is foreseen before this time after touch-down (s)."""
-CALM_TIME = 0.1
+CALM_TIME = 0.25
 """A robot that has been calm for this long will stand (s)."""
-CALM_POINT = 0.05
+CALM_POINT = 0.035
 """Calm: the capture point is this close to the middle of the soles, forward and left (m),"""
-CALM_SPEED, CALM_MOMENTUM = 0.2, 0.6
+CALM_SPEED, CALM_MOMENTUM = 0.1, 0.45
 """CoM (m/s) and angular momentum about it (kg m^2/s) are slower,"""
-CALM_LEAN, CALM_LATERAL_LEAN = math.radians(27.0), math.radians(12.0)
+CALM_LEAN, CALM_LATERAL_LEAN = math.radians(24.0), math.radians(8.0)
 """and the chest leans less, forward or back, and sideways (rad)."""
-LOST, LOST_LATERAL = 0.15, 0.12
-"""A robot whose capture point is farther from the middle of the soles will fall (m)."""
+LOST, LOST_LATERAL = 0.18, 0.14
+"""A robot whose capture point is farther from the middle of the soles will fall (m),"""
+FALL_TIME = 0.8
+"""and will have fallen after this time (s)."""
 
 
 @compiled
@@ -61,7 +63,8 @@ def foresee(state: Block, time: float, jump: Block) -> int:
             this keeps the latest time at which the robot was not calm.
 
     Returns:
-        1 if it will stand, -1 if it will fall, 0 if that is not known yet.
+        1 if it will stand, -1 if it will fall before it has stood long enough, 0 if that is not
+        known yet.
     """
     forward, sideways = capture_point(state)
     if jump.flying or not is_calm(state, forward, sideways):
@@ -69,6 +72,7 @@ def foresee(state: Block, time: float, jump: Block) -> int:
     # Not so of a robot that has not touched down, whose time is NaN.
     if jump.flying or not time - jump.touchdown_time >= EARLIEST - 1e-9:
         return 0
-    if abs(forward) > LOST or abs(sideways) > LOST_LATERAL:
+    lost = abs(forward) > LOST or abs(sideways) > LOST_LATERAL
+    if lost and time - jump.touchdown_time + FALL_TIME <= jump.rest:
         return -1
     return 1 if time - jump.restless >= CALM_TIME - 1e-9 else 0

@@ -12,7 +12,7 @@ from experiments.foresight import compare
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.metrics.foresight import CALM_TIME, EARLIEST, capture_point, foresee, is_calm
+from icub_jump_env.metrics.foresight import CALM_TIME, EARLIEST, FALL_TIME, capture_point, foresee, is_calm
 from icub_jump_env.metrics.recorder import JumpRecord
 from icub_jump_env.metrics.state import TrueState
 from icub_jump_env.planning.residual import RESIDUAL_TIME
@@ -37,7 +37,7 @@ def standing(**changes) -> TrueState:
 def verdicts(*states, after=EARLIEST, step=0.01):
     """Of states that follow one another, from ``after`` (s) touch-down on."""
     jump = JumpRecord()
-    jump.touchdown_time = 0.6
+    jump.touchdown_time, jump.rest = 0.6, 2.0
     return [
         foresee(state.block[0], 0.6 + after + k * step, jump.block[0])
         for k, state in enumerate(states)
@@ -58,12 +58,12 @@ def test_the_capture_point_is_where_a_pendulum_comes_to_rest(height, forward, le
     [
         ("com", (0.36, 0.1, 0.5)),
         ("com", (0.3, 0.16, 0.5)),
-        ("com_velocity", (0.0, 0.0, 0.21)),
-        ("com_velocity", (0.15, 0.15, 0.0)),
-        ("angular_momentum", (0.0, -0.7, 0.0)),
-        ("angular_momentum", (0.7, 0.0, 0.0)),
-        ("chest_up", (math.sin(0.5), 0.0, math.cos(0.5))),
-        ("chest_up", (0.0, math.sin(0.25), math.cos(0.25))),
+        ("com_velocity", (0.0, 0.0, 0.11)),
+        ("com_velocity", (0.08, 0.08, 0.0)),
+        ("angular_momentum", (0.0, -0.5, 0.0)),
+        ("angular_momentum", (0.5, 0.0, 0.0)),
+        ("chest_up", (math.sin(0.43), 0.0, math.cos(0.43))),
+        ("chest_up", (0.0, math.sin(0.15), math.cos(0.15))),
     ],
 )
 def test_each_motion_alone_is_not_calm(field, value):
@@ -73,17 +73,19 @@ def test_each_motion_alone_is_not_calm(field, value):
 
 
 def test_a_robot_that_stays_calm_will_stand():
-    calm, restless = standing(), standing(com_velocity=(0.25, 0.0, 0.0))
+    calm, restless = standing(), standing(com_velocity=(0.12, 0.0, 0.0))
     dwell = round(CALM_TIME / 0.01)
     assert verdicts(restless, *[calm] * (dwell + 1)) == [*[0] * dwell, 1, 1]
     assert verdicts(*[calm] * dwell, restless, calm)[-1] == 0
 
 
-@pytest.mark.parametrize("com", [(0.46, 0.1, 0.5), (0.14, 0.1, 0.5), (0.3, 0.23, 0.5)])
+@pytest.mark.parametrize("com", [(0.49, 0.1, 0.5), (0.11, 0.1, 0.5), (0.3, 0.25, 0.5)])
 def test_a_robot_whose_capture_point_has_left_the_soles_will_fall(com):
     lost = standing(com=com)
     assert verdicts(lost) == [-1]
     assert verdicts(lost, after=EARLIEST - 0.01) == [0]
+    late = 2.0 - FALL_TIME  # it might still be falling when it has stood long enough
+    assert verdicts(lost, lost, after=late - 0.005) == [-1, 0]
 
 
 @pytest.mark.parametrize("controller", ["velocity", "torque"])
@@ -95,7 +97,7 @@ def test_an_early_end_is_right(name, controller):
     assert {whole.landed for _, whole in ends} == {False, True}
     assert [early.landed for early, _ in ends] == [whole.landed for _, whole in ends]
     early, whole = np.sum([(early.steps, whole.steps) for early, whole in ends], axis=0)
-    assert 1.5 * early < whole
+    assert 1.2 * early < whole
 
 
 def test_until_it_ends_it_is_the_same_episode():
