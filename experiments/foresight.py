@@ -3,8 +3,8 @@
     python -m experiments.foresight
 
 Each episode is played twice, with and without ``early_end``, with an action that is drawn for the
-episode and stays, as an untrained policy might act: about half of the robots fall. Nothing was
-chosen on the seeds.
+episode and stays, as an untrained policy might act: a third of the robots fall. Nothing was chosen
+on the seeds.
 """
 
 from __future__ import annotations

@@ -134,8 +134,9 @@ class Sensors:
             falsify("tilt" in self._errors.kinds, errors, readings)
             if self._wrong_forces:
                 self._find_jacobians()
+                left, right = self._sole_forces
                 falsify_forces(
-                    self._sensing.block, self._jacobians, *self._sole_forces, errors, readings,
+                    self._sensing.block, self._jacobians, left, right, errors, readings,
                     self.torque_error,
                 )  # fmt: skip
         if self._config.delay:

@@ -12,7 +12,14 @@ from experiments.foresight import compare
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.metrics.foresight import CALM_TIME, EARLIEST, FALL_TIME, capture_point, foresee, is_calm
+from icub_jump_env.metrics.foresight import (
+    CALM_TIME,
+    EARLIEST,
+    FALL_TIME,
+    capture_point,
+    foresee,
+    is_calm,
+)
 from icub_jump_env.metrics.recorder import JumpRecord
 from icub_jump_env.metrics.state import TrueState
 from icub_jump_env.planning.residual import RESIDUAL_TIME
