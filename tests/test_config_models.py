@@ -177,6 +177,7 @@ class TestGroups:
             ("residual_bandwidth", 20.0, {"residual": ResidualConfig(bandwidth=20.0)}),
             ("residual_phases", "all", {"residual": ResidualConfig(phases="all")}),
             ("stand_time", 0.5, {"success": {"stand_time": 0.5}}),
+            ("early_end", True, {"success": {"early_end": True}}),
             ("render_mode", "rgb_array", {"rendering": {"mode": "rgb_array"}}),
             ("width", 320, {"rendering": {"width": 320}}),
             ("height", 200, {"rendering": {"height": 200}}),

@@ -260,8 +260,8 @@ def test_the_fields_are_sorted_into_two_kinds_with_none_forgotten():
     """A new field of the configuration must be sorted, too."""
     free = {
         "jump_height", "jumps", "plans", "solver", "timestep", "self_collision", "physics_loop",
-        "actuators", "sensors", "command_delay", "randomization", "reward", "success", "stand_time", "rendering",
-        "render_mode", "width", "height", "camera", "residual",
+        "actuators", "sensors", "command_delay", "randomization", "reward", "success", "stand_time", "early_end",
+        "rendering", "render_mode", "width", "height", "camera", "residual",
     }  # fmt: skip
     of_the_controller = {"constraints", "launch_end"}
     names = {f.name for kind in (JumpConfig, Shortcuts) for f in dataclasses.fields(kind)}
