@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
-from icub_jump_env.observation import OBSERVATION_LIMIT, entry_scales
+from icub_jump_env.observation import OBSERVATION_LIMIT
 from icub_jump_env.planning.residual import RESIDUAL_TIME
 from icub_jump_env.policy import Policy
-from icub_jump_env.policy.fields import AXES
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float32]
@@ -37,6 +36,22 @@ def acting_steps(config: JumpConfig) -> int:
     return math.ceil(longest * config.agent_frequency)
 
 
+WORLD = {
+    "payload_mass": 1.0, "payload_offset": 0.02, "friction": 0.5, "delay": 2.0, "slope": 0.05,
+    "lateral_slope": 0.05, "push": 5.0, "push_time": 1.0, "push_direction": 3.0,
+    "takeoff_spin": 0.5, "flight_push": 5.0, "flight_push_direction": 3.0, "floor_tilt": 0.05,
+    "floor_tilt_lateral": 0.05, "step": 0.02, "edge": 0.02, "landing_push": 5.0,
+    "landing_push_direction": 3.0, "encoder_bias": 0.05,
+}  # fmt: skip
+"""What a critic sees of the world, and by what it is divided."""
+
+STATE = {
+    "com": 0.1, "com_velocity": 1.0, "angular_momentum": 1.0, "base_pitch": 0.2,
+    "ground_force": 300.0,
+}  # fmt: skip
+"""The same of the true state; of the CoM's position what changed since the reset."""
+
+
 class LaunchEnv(gymnasium.Env[Array, Array]):
     """The steps in which actions matter, and the sum of all rewards.
 
@@ -44,27 +59,41 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
     side end theirs together; the step that ends it brings the rewards of flight and
     landing, too. If the jump is over before, the remaining steps do and cost nothing.
     Agents see some entries of the observation and use some axes of the action; the others
-    are zero. Episodes end early (:mod:`icub_jump_env.metrics.foresight`).
+    are zero. Episodes end early (:mod:`icub_jump_env.metrics.foresight`). Behind what an agent
+    sees may stand what only its critic sees, the world and the true state.
     """
 
-    def __init__(self, config: JumpConfig, inputs: Sequence[str], axes: Sequence[str]) -> None:
+    def __init__(
+        self,
+        config: JumpConfig,
+        inputs: Sequence[str],
+        axes: Sequence[str],
+        privileged: bool = False,
+    ) -> None:
         """Build the environment.
 
         Args:
             config: The jump.
             inputs: Names of the entries of the observation that the agent sees.
             axes: Axes of the action that it uses.
+            privileged: Whether to add what only a critic sees.
         """
         self.env: ICubJumpEnv = make_env(config.replace(early_end=True))
-        entries = list(entry_scales())
+        entries, action_axes = list(self.env.layout.scales), config.residual.axes
         self._columns = [entries.index(name) for name in inputs]
-        self._axes = [AXES.index(axis) for axis in axes]
+        self._axes = [action_axes.index(axis) for axis in axes]
         self._n_steps = acting_steps(config)
         self._scale = 1.0
         self._step = 0
-        self._over = False
+        self._over, self._privileged = False, privileged
+        self._world = np.zeros(0, np.float32)
+        self._start = np.zeros(3)
+        size = len(inputs)
+        if privileged:
+            observation, _ = self.reset(seed=0)
+            size = len(observation)
         self.observation_space = spaces.Box(
-            -OBSERVATION_LIMIT, OBSERVATION_LIMIT, (len(inputs),), np.float32
+            -OBSERVATION_LIMIT, OBSERVATION_LIMIT, (size,), np.float32
         )
         self.action_space = spaces.Box(-1.0, 1.0, (len(axes),), np.float32)
 
@@ -78,11 +107,16 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
         """As :meth:`ICubJumpEnv.reset`."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._step, self._over = 0, False
-        return observation[self._columns], info
+        if self._privileged:
+            world = info["world"]
+            values = [np.ravel(world[name]) / scale for name, scale in WORLD.items()]
+            self._world = np.concatenate(values).astype(np.float32)
+            self._start = self.env.snapshot().com
+        return self._seen(observation), info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """As :meth:`ICubJumpEnv.step`; the last one goes on to the end of the episode."""
-        residual = np.zeros(len(AXES), np.float32)
+        residual = np.zeros(self.env.action_space.shape or (), np.float32)
         if not self._over:
             residual[self._axes] = self._scale * np.clip(action, -1.0, 1.0)
         self._step += 1
@@ -91,7 +125,22 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
         while ends and not self._over:
             observation, more, self._over, _, info = self.env.step(np.zeros_like(residual))
             reward += more
-        return observation[self._columns], reward, ends, False, info
+        return self._seen(observation), reward, ends, False, info
+
+    def _seen(self, observation: Array) -> Array:
+        """What the agent sees and, behind it, what its critic does."""
+        chosen = observation[self._columns]
+        if not self._privileged:
+            return chosen
+        truth = self.env.snapshot()
+        start = {"com": self._start}
+        state = [
+            np.ravel((getattr(truth, name) - start.get(name, 0.0)) / scale)
+            for name, scale in STATE.items()
+        ]
+        both = np.concatenate((chosen, self._world, *state))
+        seen: Array = np.clip(both, -OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
+        return seen
 
     def evaluate(self, policy: Policy, seeds: Sequence[int]) -> list[Episode]:
         """Episodes of a policy that sees the whole observation, without exploration."""

@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import tyro
 
@@ -22,16 +22,15 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.cluster import Cluster
 from icub_jump_env.files import read_json
-from icub_jump_env.observation import SLICES, entry_scales
+from icub_jump_env.planning.residual import AxisName, check_axes
 from icub_jump_env.policy.fields import (
     ACTION_SCALE_RANGE,
-    AxisName,
-    check_axes,
     check_hidden,
 )
 from icub_jump_env.shortcuts import Shortcuts
 
 Inputs = Literal["all", "command"]
+Critic = Literal["observation", "world"]
 
 COMMAND_BLOCKS = (
     "phase",
@@ -128,6 +127,8 @@ class TrainOptions:
         ppo: How PPO learns.
         inputs: What the policy sees: the whole observation, or command and time alone.
         axes: Axes of the action that it uses.
+        critic: What the value function sees in training: the same, or the world and the true state,
+            too.
         timesteps: Steps of the launch to learn from; an episode has about 35.
         seed: Seed of everything random.
         seeds: Train with each of these seeds instead, such as 0..4, each in a folder of its own.
@@ -150,6 +151,7 @@ class TrainOptions:
     ppo: PPOOptions = field(default_factory=PPOOptions)
     inputs: Inputs = "all"
     axes: tuple[AxisName, ...] = ("forward", "vertical")
+    critic: Critic = "observation"
     timesteps: int = 100_000
     seed: int = 0
     seeds: str | None = None
@@ -162,8 +164,9 @@ class TrainOptions:
 
     def __post_init__(self) -> None:
         store(self, env=self.env.replace(**vars(self.shortcuts)), shortcuts=Shortcuts())
-        check_choice("inputs", self.inputs, ("all", "command"))
-        store(self, axes=check_axes(self.axes))
+        check_choice("inputs", self.inputs, get_args(Inputs))
+        check_choice("critic", self.critic, get_args(Critic))
+        store(self, axes=check_axes(self.axes, self.env.residual.axes))
         check_count("timesteps", self.timesteps, 1, 1_000_000_000, "steps")
         check_count("seed", self.seed, 0, LARGEST_SEED)
         check_count("jobs", self.jobs, 1, 1000, "processes")
@@ -215,10 +218,11 @@ class TrainOptions:
     @property
     def input_names(self) -> tuple[str, ...]:
         """Entries of the observation that the policy sees."""
-        names = tuple(entry_scales())
+        layout = self.env.layout
+        names = tuple(layout.scales)
         if self.inputs == "all":
             return names
-        return tuple(name for block in COMMAND_BLOCKS for name in names[SLICES[block]])
+        return tuple(name for block in COMMAND_BLOCKS for name in names[layout.slices[block]])
 
     def as_dict(self) -> dict[str, Any]:
         """What the result depends on, for JSON."""

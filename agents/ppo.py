@@ -9,6 +9,7 @@ from stable_baselines3 import PPO
 
 from icub_jump_env.policy import NetworkPolicy
 
+from .critic import PrivilegedPolicy
 from .environment import acting_steps
 from .options import TrainOptions
 from .vec_env import JumpVecEnv
@@ -21,12 +22,13 @@ def make_model(options: TrainOptions, env: JumpVecEnv) -> PPO:
         options: How to learn.
         env: Environments side by side.
     """
-    ppo = options.ppo
+    ppo, privileged = options.ppo, options.critic == "world"
+    actor = {"n_actor": len(options.input_names)} if privileged else {}
     with warnings.catch_warnings():
         # The last batch of a pass may be smaller than the others, which does no harm.
         warnings.filterwarnings("ignore", "You have specified a mini-batch", UserWarning)
         model = PPO(
-            "MlpPolicy",
+            PrivilegedPolicy if privileged else "MlpPolicy",
             env,
             learning_rate=ppo.learning_rate,
             n_steps=ppo.episodes // options.jobs * acting_steps(options.env),
@@ -36,7 +38,7 @@ def make_model(options: TrainOptions, env: JumpVecEnv) -> PPO:
             gae_lambda=ppo.gae_lambda,
             clip_range=ppo.clip_range,
             target_kl=ppo.target_kl,
-            policy_kwargs={"net_arch": list(ppo.hidden)},
+            policy_kwargs={"net_arch": list(ppo.hidden), **actor},
             seed=options.seed,
             device="cpu",
         )
@@ -68,4 +70,11 @@ def export(model: PPO, options: TrainOptions, action_scale: float) -> NetworkPol
     layers = tuple(
         (layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in linear
     )
-    return NetworkPolicy(options.input_names, layers, options.axes, action_scale)
+    return NetworkPolicy(
+        options.input_names,
+        layers,
+        options.axes,
+        action_scale,
+        options.env.residual.axes,
+        tuple(options.env.layout.scales),
+    )

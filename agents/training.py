@@ -94,7 +94,9 @@ def train(
             return checkpoint.num_timesteps
         if checkpoint is None and options.resume is not None:
             say(console, f"no checkpoint in {folder}: starting from step 0")
-        make = partial(LaunchEnv, options.env, options.input_names, options.axes)
+        make = partial(
+            LaunchEnv, options.env, options.input_names, options.axes, options.critic == "world"
+        )
         with contextlib.closing(JumpVecEnv([make] * options.jobs)) as env:
             timesteps = _learn(options, words, env, checkpoint, console, on_checkpoint)
         say(console, f"wrote {folder / BEST}")

@@ -70,10 +70,10 @@ def serve(what: str, controller: str) -> None:
     if name == "training":
         from agents.environment import LaunchEnv
         from agents.options import TASK
-        from icub_jump_env.observation import entry_scales
+        from icub_jump_env.observation import DEFAULT
 
         task = TASK.replace(controller=controller)
-        env, noise = LaunchEnv(task, tuple(entry_scales()), ("forward", "vertical")), 0.6
+        env, noise = LaunchEnv(task, tuple(DEFAULT.scales), ("forward", "vertical")), 0.6
     else:
         env = gymnasium.make(name, controller=controller, **keywords).unwrapped
     if what not in CASES:

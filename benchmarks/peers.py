@@ -82,7 +82,7 @@ def write_launch(folder: Path, name: ControllerName) -> None:
     while env._controller.launching:
         found = env._simulation.sensors.readings
         readings.append((found.joint_position.copy(), found.joint_velocity.copy()))
-        env._control_tick(np.zeros(3))
+        env._control_tick(np.zeros(5))
     plan: JumpPlan = env._controller.plan
     dt, robot = env.config.control_dt, env.robot
     env.close()

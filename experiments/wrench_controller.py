@@ -316,7 +316,7 @@ class WrenchLanding(FeedbackLanding):
     def _demand(self, state: RobotState, time: float) -> None:
         """Set the accelerations of CoM and lunge in the set point, and what the soles do."""
         gains, setpoint = self._gains, self.setpoint
-        offset, velocity = self._residual.offset, self._residual.velocity
+        offset, velocity = self._residual.offset[:3], self._residual.velocity[:3]
         forward, height, rise = self._stand_at(time)
         height, rise = height + offset[2], rise + velocity[2]
         # The ankles are where balance has them.

@@ -85,15 +85,15 @@ def check_seed(seed: Any) -> int | None:
     return None if seed is None else check_count("seed", seed, 0)
 
 
-def check_action(action: Any) -> NDArray[np.float64]:
-    """Refuse anything but three finite numbers; return them, clipped to [-1, 1], as float64."""
-    allowed = "three finite numbers, which are clipped to [-1, 1]"
+def check_action(action: Any, size: int = 3) -> NDArray[np.float64]:
+    """Refuse anything but finite numbers; return them, clipped to [-1, 1], as float64."""
+    allowed = f"{size} finite numbers, which are clipped to [-1, 1]"
     try:
         array = np.asarray(action)
     except ValueError:  # a ragged list
         raise ActionError("action", action, allowed) from None
-    numbers = array.dtype.kind in "fiu"
-    if not numbers or array.shape != (3,) or not all(map(math.isfinite, values := array.tolist())):
+    numbers = array.dtype.kind in "fiu" and array.shape == (size,)
+    if not numbers or not all(map(math.isfinite, values := array.tolist())):
         raise ActionError("action", action, allowed)
     return np.array([min(max(value, -1.0), 1.0) for value in values], np.float64)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,8 +35,9 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.estimation.estimator import EstimatorName
 from icub_jump_env.mappings import nested
 from icub_jump_env.metrics.jump import SuccessConfig
+from icub_jump_env.observation import Layout, ObservationConfig
 from icub_jump_env.planning.plan import Planner, PlannerName
-from icub_jump_env.planning.residual import ResidualConfig
+from icub_jump_env.planning.residual import RESIDUAL_TIME, ResidualConfig
 from icub_jump_env.planning.scaled_curve import (
     MAX_DISPLACEMENT,
     ComScaling,
@@ -101,6 +103,7 @@ class JumpConfig(WithShortcuts):
         flight: Minimum jerk to the landing posture, or soles placed by feedback.
         landing: Hold the posture, or catch by feedback.
         residual: How actions move the reference.
+        observation: What the observation has beside the default.
         agent_frequency: Rate of ``env.step`` (Hz), a divisor of the control rate.
         timestep: Physics step (s).
         self_collision: Let the robot's links touch each other.
@@ -134,6 +137,7 @@ class JumpConfig(WithShortcuts):
     flight: FlightName = "minimum_jerk"
     landing: LandingName = "hold"
     residual: ResidualConfig = field(default_factory=ResidualConfig)
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
     agent_frequency: float = 100.0
     timestep: float = 0.001
     self_collision: bool = False
@@ -232,6 +236,7 @@ class JumpConfig(WithShortcuts):
                 store(self, controller=name)
         for name, group in (
             ("residual", ResidualConfig),
+            ("observation", ObservationConfig),
             ("reward", RewardConfig),
             ("success", SuccessConfig),
             ("rendering", RenderConfig),
@@ -287,6 +292,17 @@ class JumpConfig(WithShortcuts):
         # A stream of its own: a given command finds the same world as the same one drawn.
         own = rng.spawn(1)[0]
         return tuple(own.uniform(*self.jump_height) for _ in range(self.jumps))
+
+    def foreseen_from(self, duration: float) -> float:
+        """From when on the outcome of a jump that takes off at ``duration`` is foreseen (s)."""
+        if not self.success.early_end:
+            return math.inf
+        return duration + RESIDUAL_TIME if self.residual.phases == "all" else duration
+
+    @property
+    def layout(self) -> Layout:
+        """What each entry of the observation means."""
+        return Layout(self.observation, self.residual.axes)
 
     @property
     def robot_value(self) -> Robot:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections import deque
 from typing import Any
 
 import gymnasium
@@ -10,7 +10,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from icub_jump_env import observation
 from icub_jump_env.checks import check_action, check_seed
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.jump import REST, JumpController
@@ -19,10 +18,11 @@ from icub_jump_env.control.qp.problem import IDLE, worse
 from icub_jump_env.estimation.estimator import Estimator
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.imu import ImuEstimator
+from icub_jump_env.estimation.readings import LOADED
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.metrics.series import SeriesRecorder
+from icub_jump_env.observation import OBSERVATION_LIMIT
 from icub_jump_env.planning.plan import JumpPlan
-from icub_jump_env.planning.residual import RESIDUAL_TIME
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot.collision import TOLERANCE
 from icub_jump_env.robot.frames import mujoco_qpos
@@ -118,11 +118,11 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.config = JumpConfig.of(**config)
         self.render_mode = self.config.rendering.mode
         self.metadata = {**self.metadata, "render_fps": round(self.config.agent_frequency)}
-        limit = observation.OBSERVATION_LIMIT
-        self.observation_space = spaces.Box(-limit, limit, (observation.SIZE,), np.float32)
-        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
-
+        self.layout = self.config.layout
+        limit = OBSERVATION_LIMIT
+        self.observation_space = spaces.Box(-limit, limit, (self.layout.size,), np.float32)
         cfg, self.robot = self.config, self.config.robot_value
+        self.action_space = spaces.Box(-1.0, 1.0, (len(cfg.residual.axes),), np.float32)
         self._simulation = Simulation(
             Physics(
                 self.robot,
@@ -150,13 +150,14 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._controller = JumpController(
             cfg.controller_config, cfg.residual, kinematics, cfg.flight, cfg.landing
         )
-        self._residual_scale = np.array(cfg.residual.scale)
+        self._moves = cfg.residual.matrix
         self._state: RobotState
         self._start_com = np.zeros(3)
         self._heights: tuple[float, ...] = ()
         self._outcome = "not reset"
         self._report = IDLE
-        self._observation = np.zeros(observation.SIZE, np.float32)
+        self._observation = np.zeros(self.layout.size, np.float32)
+        self._earlier: deque[NDArray[np.float32]] = deque()
         self._renderer = make_renderer(self._simulation.physics, self.config.rendering)
 
     @property
@@ -202,6 +203,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._next_look = 0.0
         self._outcome = "running"
         self._report = IDLE
+        self._earlier.clear()
         self._observe()
         if self.render_mode == "human":
             self.render()
@@ -213,7 +215,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Advance by ``dt``; less if the episode ends within.
 
         Args:
-            action: (3,) in [-1, 1]; what lies beyond is clipped.
+            action: One entry for each of ``residual_axes``, in [-1, 1]; what lies beyond is clipped.
 
         Returns:
             Observation, reward, terminated, truncated (always False) and info.
@@ -224,10 +226,10 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         if self._outcome == "not reset":
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        action64 = check_action(action)
+        action64 = check_action(action, len(self.config.residual.axes))
         if not self._controller.residual_acts(self._simulation.physics.data.time):
-            action64 = np.zeros(3)  # has no effect and costs nothing
-        target = action64 * self._residual_scale
+            action64[:] = 0.0  # has no effect and costs nothing
+        target = self._moves @ action64
         self._report = IDLE
         already_over, before = self._outcome != "running", self._series.begun
         if self._simulation.physics.diverged:
@@ -268,6 +270,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             joint_torque_command=drives.torque_command.copy(),
             com=truth.com.copy(),
             com_velocity=truth.com_velocity.copy(),
+            angular_momentum=truth.angular_momentum.copy(),
             com_estimate=self._state.com.copy(),
             com_reference=reference.copy(),
             base_pitch=truth.base_pitch,
@@ -315,20 +318,13 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         height, *more = self._heights[begun:]
         rest = REST if more else None
         truth = self._simulation.truth.read()
-        self._series.begin(
-            height, plan.duration, truth, time, rest, self._foreseen_from(plan.duration)
-        )
+        foreseen_from = self.config.foreseen_from(plan.duration)
+        self._series.begin(height, plan.duration, truth, time, rest, foreseen_from)
         self._estimator.reset()
         self._sense()
         self._start_com[:] = self._state.com
         following = self._planner.plan(more[0]) if more else None
         self._controller.start(plan, self._state, time, following)
-
-    def _foreseen_from(self, duration: float) -> float:
-        """From when on the outcome may be foreseen (s of the jump): not while a residual acts."""
-        if not self.config.success.early_end:
-            return math.inf
-        return duration + RESIDUAL_TIME if self.config.residual.phases == "all" else duration
 
     def _look_for_overlap(self) -> None:
         data = self._simulation.physics.data
@@ -368,14 +364,18 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "com_velocity": state.com_velocity,
             "angular_momentum": state.angular_momentum,
             "com_error": com_error,
-            "residual_offset": residual.offset,
-            "residual_velocity": residual.velocity,
+            "residual_offset": residual.offset[:3],
+            "residual_velocity": residual.velocity[:3],
+            "residual_momentum": residual.offset[3:],
+            "residual_torque": residual.velocity[3:],
             "foot_force": readings.foot_force,
+            "cop": readings.cop.ravel(),
+            "contact": (readings.foot_force > LOADED).astype(float),
         }
-        self._observation = observation.encode(values)
+        self._observation = self.layout.encode(values, self._earlier)
 
     def _info(self) -> dict[str, Any]:
-        series, jumps, report = self._series, self._series.jumps, self._report
+        series, jumps = self._series, self._series.jumps
         together = (
             {}
             if self.config.jumps == 1
@@ -392,8 +392,5 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "phase": self._controller.phases.phase.name.lower(),
             "time": float(self._simulation.physics.data.time),
             "jump_height": jumps[-1].height,
-            "solver_status": str(report.status),
-            "solver_primal_residual": report.residuals.primal,
-            "solver_dual_residual": report.residuals.dual,
-            "solver_gap": report.residuals.gap,
+            **self._report.as_dict(),
         }

@@ -7,12 +7,17 @@ docs/environment.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.checks import check_count, check_flag, store
+from icub_jump_env.planning.residual import AXES, COM_AXES, AxisName
 from icub_jump_env.robot.icub import JOINT_NAMES
 
 OBSERVATION_LIMIT = 10.0
@@ -40,6 +45,11 @@ class Block:
     unit: str
     frame: str
     scale: float
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """The name of each of its entries."""
+        return tuple(f"{self.name}.{label}" if label else self.name for label in self.labels)
 
 
 BLOCKS: tuple[Block, ...] = (
@@ -81,53 +91,150 @@ BLOCKS: tuple[Block, ...] = (
 )
 
 
-def _slices() -> dict[str, slice]:
-    slices, start = {}, 0
-    for block in BLOCKS:
-        slices[block.name] = slice(start, start + len(block.labels))
-        start += len(block.labels)
-    return slices
+HISTORY_BLOCKS = (
+    "com_offset", "com_velocity", "angular_momentum", "gravity", "gyro", "foot_force",
+    "residual_offset", "cop",
+)  # fmt: skip
+"""What is shown of earlier steps, too, as far as it is shown at all."""
+
+MAX_HISTORY = 16
 
 
-SLICES = _slices()
-"""Slice of each block in the observation."""
+@dataclass(frozen=True)
+class ObservationConfig:
+    """What the observation has beside :data:`BLOCKS`, behind them.
 
-SIZE = sum(len(block.labels) for block in BLOCKS)
+    Attributes:
+        cop: Show the centre of pressure under each sole.
+        contacts: Show which soles carry load.
+        history: How many earlier steps to show the CoM, momentum, IMU, feet and residual of.
 
-_SCALE = np.concatenate([np.full(len(block.labels), block.scale) for block in BLOCKS])
-
-
-def encode(values: Mapping[str, NDArray[np.float64] | float]) -> NDArray[np.float32]:
-    """Assemble, scale and clip an observation.
-
-    Args:
-        values: The value of each block by name, in SI units.
-
-    Returns:
-        (SIZE,) entries of the observation space.
+    Raises:
+        ConfigError: If a value is out of range.
     """
-    raw = np.empty(SIZE)
-    for block in BLOCKS:
-        raw[SLICES[block.name]] = values[block.name]
-    scaled: NDArray[np.float64] = np.clip(raw / _SCALE, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
-    return scaled.astype(np.float32)
+
+    cop: bool = False
+    contacts: bool = False
+    history: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("cop", "contacts"):
+            store(self, **{name: check_flag(name, getattr(self, name))})
+        store(self, history=check_count("history", self.history, 0, MAX_HISTORY, "steps"))
 
 
-def entry_scales() -> dict[str, float]:
-    """By what each entry is divided; entries by name, in the order of the observation."""
-    return {
-        f"{block.name}.{label}" if label else block.name: block.scale
-        for block in BLOCKS
-        for label in block.labels
-    }
+class Layout:
+    """What each entry of an observation means.
+
+    Attributes:
+        blocks: Blocks in their order.
+        slices: Slice of each block.
+        size: Number of entries.
+        scales: By what each entry is divided; entries by name, in their order.
+    """
+
+    def __init__(
+        self, config: ObservationConfig | None = None, axes: Sequence[AxisName] = COM_AXES
+    ) -> None:
+        """Lay out the observation.
+
+        Args:
+            config: What it has beside :data:`BLOCKS`.
+            axes: What actions move: the residual of the momentum is shown if they move that.
+        """
+        self._made_of = config, axes
+        config = config or ObservationConfig()
+        self._present = (*BLOCKS, *_more_blocks(config, axes))
+        remembered = [block for block in self._present if block.name in HISTORY_BLOCKS]
+        earlier = [
+            replace(
+                block,
+                name=f"{block.name}@{steps}",
+                meaning=f"{block.name}, {_steps(steps)} before",
+            )
+            for steps in range(1, config.history + 1)
+            for block in remembered
+        ]
+        self.blocks = (*self._present, *earlier)
+        self.slices: dict[str, slice] = {}
+        self.size = 0
+        for block in self.blocks:
+            self.slices[block.name] = slice(self.size, self.size + len(block.labels))
+            self.size += len(block.labels)
+        self.scales: Mapping[str, float] = MappingProxyType(
+            {name: block.scale for block in self.blocks for name in block.entries}
+        )
+        n_present = sum(len(block.labels) for block in self._present)
+        self._divisors = np.array(list(self.scales.values())[:n_present])
+        places = np.arange(self.size)
+        self._remembered = np.concatenate([places[self.slices[b.name]] for b in remembered])
+        self._history = config.history
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Layout, self._made_of
+
+    def encode(
+        self,
+        values: Mapping[str, NDArray[np.float64] | float],
+        earlier: deque[NDArray[np.float32]],
+    ) -> NDArray[np.float32]:
+        """Assemble, scale and clip an observation.
+
+        Args:
+            values: The value of each block of the present by name, in SI units.
+            earlier: What is remembered of earlier steps, to which this adds the present one; if
+                it is empty, the present stands for them.
+
+        Returns:
+            (size,) entries of the observation space.
+        """
+        raw = np.empty(len(self._divisors))
+        for block in self._present:
+            raw[self.slices[block.name]] = values[block.name]
+        scaled = np.clip(raw / self._divisors, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
+        present: NDArray[np.float32] = scaled.astype(np.float32)
+        if not self._history:
+            return present
+        frame = present[self._remembered]
+        if not earlier:
+            earlier.extend([frame] * self._history)
+        whole: NDArray[np.float32] = np.concatenate((present, *earlier))
+        earlier.pop()
+        earlier.appendleft(frame)
+        return whole
 
 
-def layout_table() -> str:
+def _steps(count: int) -> str:
+    return "a step" if count == 1 else f"{count} steps"
+
+
+def _more_blocks(config: ObservationConfig, axes: Sequence[AxisName]) -> Iterator[Block]:
+    soles, unit = ("left.x", "left.y", "right.x", "right.y"), "kg m^2/s"
+    if not set(axes) <= set(COM_AXES):
+        yield Block(
+            "residual_momentum", ("x", "y"), "shaped residual on the momentum", unit, "world", 1.0
+        )
+        yield Block("residual_torque", ("x", "y"), "its derivative", "Nm", "world", 10.0)
+    if config.cop:
+        meaning = "centre of pressure from the middle of the sole; 0 below 5 N"
+        yield Block("cop", soles, meaning, "m", "sole, x forward", 0.05)
+    if config.contacts:
+        meaning = "whether the sole carries more than 5 N"
+        yield Block("contact", ("left", "right"), meaning, "-", "-", 1.0)
+
+
+DEFAULT = Layout()
+"""That of the default configuration; others begin with it."""
+
+SLICES, SIZE = DEFAULT.slices, DEFAULT.size
+
+
+def layout_table(layout: Layout = DEFAULT) -> str:
     """The layout as a Markdown table, one row per entry."""
     rows = ["| index | entry | meaning | unit | frame | divided by |", "|---|---|---|---|---|---|"]
-    entries = list(entry_scales())
-    for block in BLOCKS:
-        for index in range(SLICES[block.name].start, SLICES[block.name].stop):
+    entries = list(layout.scales)
+    for block in layout.blocks:
+        for index in range(layout.slices[block.name].start, layout.slices[block.name].stop):
             rows.append(
                 f"| {index} | `{entries[index]}` | {block.meaning} "
                 f"| {block.unit} | {block.frame} | {block.scale:g} |"
@@ -136,4 +243,4 @@ def layout_table() -> str:
 
 
 if __name__ == "__main__":
-    print(layout_table())
+    print(layout_table(Layout(ObservationConfig(cop=True, contacts=True, history=1), AXES)))

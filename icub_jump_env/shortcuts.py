@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from icub_jump_env.control.config import Constraints, LaunchEnd, SolverName
 from icub_jump_env.errors import ConfigError, UnknownFieldError
-from icub_jump_env.planning.residual import ResidualPhases
+from icub_jump_env.planning.residual import AxisName, ResidualPhases
 from icub_jump_env.simulation.render_config import CameraName, RenderMode
 
 
@@ -27,8 +27,9 @@ class Shortcuts:
         control_frequency: Rate of the controller (Hz), a divisor of the physics rate; by
             default 200 for the velocity controller and 500 for the torque controller.
         launch_end: Whether the launch ends at T or at lift-off alone.
-        residual_scale: Largest offset of the CoM reference that an action can ask for:
-            forward, lateral, vertical (m).
+        residual_axes: What an action moves: some of forward, lateral, vertical, roll, pitch.
+        residual_scale: What an action of 1 moves each of these by: the CoM (m), and its angular
+            momentum (kg m^2/s).
         residual_bandwidth: Natural frequency of the filter that shapes the residual (rad/s).
         residual_phases: Whether the residual acts in the launch alone or in all phases.
         stand_time: How long the robot must stand after touch-down (s).
@@ -44,7 +45,8 @@ class Shortcuts:
     momentum_control: bool | None = None
     control_frequency: float | None = None
     launch_end: LaunchEnd | None = None
-    residual_scale: tuple[float, float, float] | None = None
+    residual_axes: tuple[AxisName, ...] | None = None
+    residual_scale: tuple[float, ...] | None = None
     residual_bandwidth: float | None = None
     residual_phases: ResidualPhases | None = None
     stand_time: float | None = None
@@ -62,6 +64,7 @@ PATHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "momentum_control": ("controller", "momentum_control"),
         "control_frequency": ("controller", "frequency"),
         "launch_end": ("controller", "phases", "launch_end"),
+        "residual_axes": ("residual", "axes"),
         "residual_scale": ("residual", "scale"),
         "residual_bandwidth": ("residual", "bandwidth"),
         "residual_phases": ("residual", "phases"),

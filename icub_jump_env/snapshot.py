@@ -25,6 +25,7 @@ class Snapshot:
             torque control.
         com: (3,) true CoM position (m).
         com_velocity: (3,) true CoM velocity (m/s).
+        angular_momentum: (3,) true angular momentum about the CoM (kg m^2/s).
         com_estimate: (3,) CoM position that the controllers believe in (m): from the encoders,
             as if the feet stood still.
         com_reference: (3,) CoM reference (m); NaN after the launching phase.
@@ -41,6 +42,7 @@ class Snapshot:
     joint_torque_command: Array
     com: Array
     com_velocity: Array
+    angular_momentum: Array
     com_estimate: Array
     com_reference: Array
     base_pitch: float

@@ -170,7 +170,8 @@ class ICubJumpVectorEnv(SyncVectorEnv):
         Raises:
             ActionError, gymnasium.error.ResetNeeded: As :meth:`step`.
         """
-        checked = [check_action(action) for action in actions]
+        size = gymnasium.spaces.flatdim(self.single_action_space)
+        checked = [check_action(action, size) for action in actions]
         if len(checked) != self.num_envs:
             raise ActionError("actions", actions, f"{self.num_envs}, one for each environment")
         pending = deque(zip(self.envs, checked, strict=True))

@@ -83,7 +83,7 @@ def test_a_range_of_no_width_is_its_command():
 
 
 def test_info_observation_and_reward_go_by_the_command_drawn(ranging):
-    scales = observation.entry_scales()
+    scales = observation.DEFAULT.scales
     places = {name: observation.SLICES[name].start for name in ("jump_height", "takeoff_time")}
     for seed in (0, 1):
         obs, info = ranging.reset(seed=seed)

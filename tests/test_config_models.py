@@ -173,6 +173,7 @@ class TestGroups:
                 "lift_off",
                 {"controller": {"kind": "velocity", "phases": {"launch_end": "lift_off"}}},
             ),
+            ("residual_axes", ("forward", "pitch"), {"residual": {"axes": ["forward", "pitch"]}}),
             ("residual_scale", (0.01, 0.02, 0.03), {"residual": {"scale": [0.01, 0.02, 0.03]}}),
             ("residual_bandwidth", 20.0, {"residual": ResidualConfig(bandwidth=20.0)}),
             ("residual_phases", "all", {"residual": ResidualConfig(phases="all")}),

@@ -55,10 +55,10 @@ def test_the_posture_follows_the_residual_to_the_shift_of_the_com():
     controller, state = env._controller, env._state
     for tick, force in enumerate((0.0, 0.0, 150.0)):
         state.foot_force = np.full(2, force)
-        controller.tick(state, 0.005 * tick, np.zeros(3))
+        controller.tick(state, 0.005 * tick, np.zeros(5))
     assert controller.phases.phase is Phase.LANDING
     commands = []
-    for target in (np.zeros(3), np.array([0.01, 0.004, -0.01])):
+    for target in (np.zeros(5), np.array([0.01, 0.004, -0.01, 0.0, 0.0])):
         for count in range(400):
             tick = controller.tick(state, 1.0 + 0.005 * count, target)
         commands.append(tick.command.position.copy())

@@ -112,8 +112,8 @@ class MinimumJerkFlight:
         position, velocity = self._motion.sample(time - self._began)
         if self._shift is not None:
             self._residual.step(residual_target, self._dt)
-            position = position + self._shift @ self._residual.offset
-            velocity = velocity + self._shift @ self._residual.velocity
+            position = position + self._shift @ self._residual.offset[:3]
+            velocity = velocity + self._shift @ self._residual.velocity[:3]
         self.command = JointCommand(velocity, position)
         return Tick(self.command, None)
 
@@ -261,7 +261,7 @@ def take_aim(state: Block, residual: Array, setpoint: Block, aim: Block) -> None
 
     Args:
         state: The believed state.
-        residual: (3,) what the residual adds to the CoM's place over the soles (m).
+        residual: (5,) the first three are added to the CoM's place over the soles (m).
         setpoint: What says so; this sets the position of its CoM.
         aim: Block of the :class:`Aim`.
     """

@@ -163,7 +163,7 @@ class FeedbackLanding:
         kinematics, setpoint, dt = self._kinematics, self.setpoint, self._dt
         s = state.joint_position
         self._residual.step(residual_target, dt)
-        x, y, z = self._residual.offset.tolist()
+        x, y, z = self._residual.offset[:3].tolist()
         forward, height, rise = self._stand_at(time)
         # The ankles are where balance has them, and the soles tell what is level.
         setpoint.posture[self._ankles] = self._position[self._ankles] = s[self._ankles]

@@ -14,8 +14,8 @@ class Reference:
     """What the launch tracks.
 
     Attributes:
-        setpoint: The set point in the world; its posture and momentum are the plan's.
-        residual: The shaped residual that is part of its CoM.
+        setpoint: The set point in the world; its posture is the plan's.
+        residual: The shaped residual that is part of its CoM and momentum.
     """
 
     def __init__(self, residual: ResidualFilter) -> None:
@@ -47,3 +47,6 @@ def move(planned: Block, start: Array, residual: Block, setpoint: Block) -> None
         moved.com_position[i] += start[i] + shift.offset[i]
         moved.com_velocity[i] += shift.velocity[i]
         moved.com_acceleration[i] += shift.acceleration[i]
+    for i in range(2):
+        moved.angular_momentum[i] += shift.offset[3 + i]
+        moved.angular_momentum_rate[i] += shift.velocity[3 + i]

@@ -11,12 +11,10 @@ from typing import Any, Self, get_args
 from icub_jump_env.checks import check_choice, check_count, check_number, check_seed, store
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
-from icub_jump_env.observation import entry_scales
+from icub_jump_env.planning.residual import COM_AXES, AxisName, check_axes
 from icub_jump_env.policy.fields import (
     ACTION_SCALE_RANGE,
-    AxisName,
     PolicyKind,
-    check_axes,
     check_command,
     check_hidden,
     check_inputs,
@@ -41,6 +39,7 @@ TASK_FIELDS = (
     "com_displacement",
     "com_scaling",
     "momentum_control",
+    "residual_axes",
     "residual_scale",
     "residual_bandwidth",
     "residual_phases",
@@ -62,6 +61,7 @@ BEFORE_THERE_WAS_A_CHOICE = {
     "estimator": "feet_fixed",
     "flight": "minimum_jerk",
     "landing": "hold",
+    "residual_axes": COM_AXES,
 }
 """What holds for cards that do not say these fields."""
 
@@ -162,7 +162,7 @@ def mismatches(card: PolicyCard, config: JumpConfig) -> list[tuple[str, Any, Any
         Name of each field that differs, the card's value, the environment's; None for an
         entry of the observation that one of them lacks.
     """
-    theirs, ours = dict(card.observation), entry_scales()
+    theirs, ours = dict(card.observation), dict(config.layout.scales)
     pairs = [(f"observation.{name}", theirs.get(name), ours.get(name)) for name in theirs | ours]
     pairs += [(name, card.config.value_of(name), config.value_of(name)) for name in TASK_FIELDS]
     trained, given = card.config.controller_config, config.controller_config

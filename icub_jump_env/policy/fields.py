@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,6 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.files import MAX_DEPTH, deeper
 
 PolicyKind = Literal["network", "replay"]
-AxisName = Literal["forward", "lateral", "vertical"]
-
-AXES: tuple[AxisName, ...] = get_args(AxisName)
-"""The axes of an action, in order."""
-
 ACTION_SCALE_RANGE = (1e-3, 1.0)
 
 MAX_HIDDEN = 4
@@ -44,14 +39,6 @@ def check_inputs(inputs: Any, entries: Collection[str]) -> tuple[str, ...]:
     if len(set(inputs)) < len(inputs):
         raise ConfigError("inputs", inputs, "each entry at most once")
     return tuple(inputs)
-
-
-def check_axes(axes: Any) -> tuple[AxisName, ...]:
-    """Refuse anything but some of :data:`AXES`, in their order."""
-    listed = isinstance(axes, list | tuple) and len(axes) > 0
-    if not listed or list(axes) != [axis for axis in AXES if axis in axes]:
-        raise ConfigError("axes", axes, f"some of {', '.join(AXES)}, in this order")
-    return tuple(axes)
 
 
 def check_hidden(hidden: Any) -> tuple[int, ...]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from icub_jump_env.checks import check_type
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, PolicyFileError
-from icub_jump_env.observation import entry_scales
 from icub_jump_env.policy.card import PolicyCard, check_match
 from icub_jump_env.policy.files import load_tensors, save_tensors
 from icub_jump_env.policy.network import NetworkPolicy
@@ -42,7 +41,7 @@ class LoadedPolicy:
     card: PolicyCard
 
     def __call__(self, observation: Array) -> Array:
-        """The action (3,) for an observation (80,)."""
+        """The action for an observation, each as the environment has them."""
         return self.policy(observation)
 
 
@@ -81,7 +80,7 @@ def save_policy(
         )
     card = PolicyCard(
         kind=policy.kind,
-        observation=tuple(entry_scales().items()),
+        observation=tuple(config.layout.scales.items()),
         config=config,
         versions=versions,
         command=tuple(command),
@@ -133,12 +132,19 @@ def _make(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> SavedPolicy:
     if card.kind == "replay":
         _check_names(tensors, ["commands", "actions"])
         frequency = card.config.agent_frequency
-        policy = ReplayPolicy(tensors["commands"], tensors["actions"], frequency)
+        policy = ReplayPolicy(tensors["commands"], tensors["actions"], frequency, card.axes)
     else:
         names = [(f"layers.{i}.weight", f"layers.{i}.bias") for i in range(len(card.hidden) + 1)]
         _check_names(tensors, [name for layer in names for name in layer])
         layers = tuple((tensors[weight], tensors[bias]) for weight, bias in names)
-        policy = NetworkPolicy(card.inputs, layers, card.axes, card.action_scale)
+        policy = NetworkPolicy(
+            card.inputs,
+            layers,
+            card.axes,
+            card.action_scale,
+            card.config.residual.axes,
+            tuple(card.config.layout.scales),
+        )
     for field in _SHARED_FIELDS:
         given, actual = getattr(card, field), getattr(policy, field)
         if given != actual:

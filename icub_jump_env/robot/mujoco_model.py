@@ -221,6 +221,7 @@ def _add_sensors(spec: mujoco.MjSpec, robot: Robot) -> None:
     ground: dict[str, Any] = {"objtype": body, "objname": "world"}
     field = mujoco.mjtConDataField
     found_and_force = (1 << int(field.mjCONDATA_FOUND)) | (1 << int(field.mjCONDATA_FORCE))
+    and_place = found_and_force | (1 << int(field.mjCONDATA_POS))
     net_force, one_slot = 3, 1
     for side in "lr":
         spec.add_sensor(
@@ -229,7 +230,7 @@ def _add_sensors(spec: mujoco.MjSpec, robot: Robot) -> None:
             **ground,
             reftype=mujoco.mjtObj.mjOBJ_GEOM,
             refname=sole_geom(side),
-            intprm=[found_and_force, net_force, one_slot],
+            intprm=[and_place, net_force, one_slot],
         )
     spec.add_sensor(
         name="floor_force",

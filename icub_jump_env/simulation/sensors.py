@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from icub_jump_env.compiled import compiled
-from icub_jump_env.estimation.readings import Readings
+from icub_jump_env.estimation.readings import LOADED, Readings
 from icub_jump_env.linear_algebra import add_cross, rotate_back
 from icub_jump_env.records import Array, Block, Number, PerJoint, Record, Vector
 from icub_jump_env.robot.mujoco_model import sole_geom
@@ -81,10 +81,15 @@ class Sensors:
         self._sole_forces = tuple(data.sensor(f"{side}_sole_force").data for side in "lr")
         geoms = [physics.model.geom(sole_geom(side)) for side in "lr"]
         self._soles = [(data.geom_xpos[geom.id], int(geom.bodyid[0])) for geom in geoms]
+        self._sole_frames = tuple(
+            array
+            for geom in geoms
+            for array in (data.geom_xpos[geom.id], data.geom_xmat[geom.id].reshape(3, 3))
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         # Views of MuJoCo's arrays have to be taken anew from a copy's own data.
-        views = ("_sources", "_sole_forces", "_soles")
+        views = ("_sources", "_sole_forces", "_soles", "_sole_frames")
         return {name: value for name, value in self.__dict__.items() if name not in views}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -128,7 +133,10 @@ class Sensors:
     def read(self) -> Readings:
         """Take new readings."""
         readings, time = self.readings.block, self._physics.data.time
-        take(time, self._sensing.block, readings, *self._sources, *self._sole_forces)
+        take(
+            time, self._sensing.block, readings, *self._sources, *self._sole_forces,
+            *self._sole_frames,
+        )  # fmt: skip
         if self._errors.kinds or self._wrong_forces:
             errors = self._errors.draw(time).block
             falsify("tilt" in self._errors.kinds, errors, readings)
@@ -166,6 +174,10 @@ def take(
     base_velocity: Array,
     left_force: Array,
     right_force: Array,
+    left_position: Array,
+    left_rotation: Array,
+    right_position: Array,
+    right_rotation: Array,
 ) -> None:
     """Take readings without errors, but for the world's bias of the encoders.
 
@@ -178,14 +190,21 @@ def take(
         imu_rotation: (3, 3) orientation of the IMU.
         gyro: (3,) its angular velocity, IMU axes (rad/s).
         base_velocity: (3,) its velocity, world axes (m/s).
-        left_force: (4,) of the left sole: contacts, and the force forward, left and up (N).
-        right_force: (4,) of the right sole.
+        left_force: (7,) of the left sole: contacts, the force forward, left and up (N), and where
+            it acts (m), world axes.
+        right_force: (7,) of the right sole.
+        left_position: (3,) middle of the left sole (m).
+        left_rotation: (3, 3) its orientation.
+        right_position: (3,) of the right sole.
+        right_rotation: (3, 3) likewise.
     """
     s, told = sensing[0], readings[0]
     for j in range(joint_position.shape[0]):
         told.joint_position[j] = joint_position[j] + s.encoder_bias[j]
         told.joint_velocity[j] = joint_velocity[j]
     told.foot_force[0], told.foot_force[1] = left_force[3], right_force[3]
+    find_cop(left_force, left_position, left_rotation, told.cop[0])
+    find_cop(right_force, right_position, right_rotation, told.cop[1])
     rotate_back(imu_rotation, s.down, told.gravity)
     passed, specific = time - s.time, -s.gravity
     for i in range(3):
@@ -195,6 +214,16 @@ def take(
         s.velocity[i] = base_velocity[i]
     rotate_back(imu_rotation, specific, told.accelerometer)
     s.time = time
+
+
+@compiled
+def find_cop(force: Array, position: Array, rotation: Array, cop: Array) -> None:
+    """Write the centre of pressure of a sole, (2,), in its frame; zero if it carries nothing."""
+    for axis in range(2):
+        cop[axis] = 0.0
+        if force[3] > LOADED:
+            for i in range(3):
+                cop[axis] += rotation[i, axis] * (force[4 + i] - position[i])
 
 
 @compiled
@@ -234,8 +263,8 @@ def falsify_forces(
     Args:
         sensing: Block of the :class:`Sensing`.
         jacobians: (2, 6, n + 6) of the middles of the soles, linear part first, world axes.
-        left_force: (4,) as of :func:`take`.
-        right_force: (4,) likewise.
+        left_force: (7,) as of :func:`take`.
+        right_force: (7,) likewise.
         errors: As of :func:`falsify`.
         readings: Likewise.
         torque_error: (n,) of the torques computed from the forces (Nm), which this sets.
@@ -252,3 +281,21 @@ def falsify_forces(
             for j in range(torque_error.shape[0]):
                 torque_error[j] -= jacobians[foot, i, 6 + j] * force
                 torque_error[j] -= jacobians[foot, 3 + i, 6 + j] * moment
+        moment, told = e.moment[foot], readings[0].foot_force[foot]
+        falsify_cop(measured[3], told, moment[0], moment[1], readings[0].cop[foot])
+
+
+@compiled
+def falsify_cop(force: float, told: float, roll: float, pitch: float, cop: Array) -> None:
+    """What errors of the moments (Nm) make of a centre of pressure, (2,): moments over force.
+
+    Args:
+        force: True force (N).
+        told: What the sensor says (N).
+        roll: Error of the moment about the forward axis.
+        pitch: About the axis to the left.
+        cop: From the middle of the sole (m), which this changes.
+    """
+    loaded = force > LOADED and told > LOADED
+    cop[0] = (cop[0] * force - pitch) / told if loaded else 0.0
+    cop[1] = (cop[1] * force + roll) / told if loaded else 0.0

@@ -11,12 +11,12 @@ from agents.environment import LaunchEnv, acting_steps
 from agents.options import TASK
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
-from icub_jump_env.observation import entry_scales
+from icub_jump_env.observation import DEFAULT
+from icub_jump_env.planning.residual import COM_AXES as AXES
 from icub_jump_env.policy import NetworkPolicy
-from icub_jump_env.policy.fields import AXES
 
 CONFIG = TASK.replace(stand_time=0.1)
-NAMES = tuple(entry_scales())
+NAMES = tuple(DEFAULT.scales)
 SOME = ("gyro.y", "launch_progress", "com_error.x")
 STEPS = acting_steps(CONFIG)
 
@@ -114,7 +114,7 @@ def test_no_launch_of_the_range_is_longer(scaling, height):
     config = JumpConfig.of(jump_height=(0.02, 0.04), com_scaling=scaling)
     env = make_env(config)
     observation, _ = env.reset(options={"jump_height": height})
-    duration = observation[NAMES.index("takeoff_time")] * entry_scales()["takeoff_time"]
+    duration = observation[NAMES.index("takeoff_time")] * DEFAULT.scales["takeoff_time"]
     assert acting_steps(config) >= np.ceil(duration * config.agent_frequency - 1e-4)
 
 

@@ -10,7 +10,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import TorqueConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.report.output import write_json
-from icub_jump_env.observation import entry_scales
+from icub_jump_env.observation import DEFAULT
 from icub_jump_env.planning.residual import ResidualConfig
 from icub_jump_env.shortcuts import Shortcuts
 
@@ -144,7 +144,7 @@ def test_a_setting_of_ppo_out_of_range_is_refused(name, value):
 
 
 def test_a_plan_sees_the_command_and_the_time_alone():
-    entries = tuple(entry_scales())
+    entries = tuple(DEFAULT.scales)
     assert TrainOptions().input_names == entries
     assert TrainOptions(inputs="command").input_names == (
         *("phase.launch", "phase.flight", "phase.landing", "launch_progress", "time"),

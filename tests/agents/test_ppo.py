@@ -13,8 +13,8 @@ from agents.environment import LaunchEnv, acting_steps
 from agents.options import TASK, TrainOptions
 from agents.ppo import export, freeze_policy, make_model, set_noise
 from icub_jump_env.evaluation.episodes.rollout import make_env
-from icub_jump_env.observation import entry_scales
-from icub_jump_env.policy.fields import AXES
+from icub_jump_env.observation import DEFAULT
+from icub_jump_env.planning.residual import COM_AXES as AXES
 
 OPTIONS = TrainOptions(env=TASK.replace(stand_time=0.1), ppo=PPO, jobs=1, timesteps=1000)
 ROLLOUT = 2 * acting_steps(OPTIONS.env)
@@ -88,7 +88,7 @@ def test_the_exported_policy_acts_as_the_model(rng, inputs, axes):
     with torch.no_grad():
         for parameter in model.policy.parameters():
             parameter.copy_(torch.tensor(rng.normal(0, 0.5, parameter.shape)))
-    names = list(entry_scales())
+    names = list(DEFAULT.scales)
     columns = [names.index(name) for name in options.input_names]
     rows = [AXES.index(axis) for axis in axes]
     policy = export(model, options, 0.5)
@@ -115,7 +115,7 @@ def test_a_jump_of_the_exported_policy_is_the_one_trained_on(rng):
     observation, _ = env.reset(seed=5)
     plain = make_env(options.env)
     whole, _ = plain.reset(seed=5)
-    offset, offsets = list(entry_scales()).index("residual_offset.z"), []
+    offset, offsets = list(DEFAULT.scales).index("residual_offset.z"), []
     for _ in range(acting_steps(options.env) - 1):
         np.testing.assert_allclose(observation, whole, rtol=0, atol=1e-4)
         observation, *_ = env.step(model.predict(observation, deterministic=True)[0])

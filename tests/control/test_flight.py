@@ -8,7 +8,7 @@ from standing import ROBOT, STANCE, N
 from icub_jump_env.control import flight as flight_module
 from icub_jump_env.control.flight import FeedbackFlight, MinimumJerkFlight
 from icub_jump_env.estimation.state import RobotState
-from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.planning.residual import N_AXES, ResidualFilter
 from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
@@ -18,7 +18,7 @@ KINEMATICS = FeetFixedKinematics(ROBOT)
 KINEMATICS.update(ROBOT.landing)
 UPRIGHT = KINEMATICS.base_rotation.copy()
 REST = KINEMATICS.com - KINEMATICS.sole_positions.mean(axis=0)
-NOTHING = np.zeros(3)
+NOTHING = np.zeros(N_AXES)
 
 
 def in_the_air(**values) -> RobotState:
@@ -210,7 +210,7 @@ def test_legs_do_not_give_way_where_the_soles_are_far_behind():
 
 def test_a_residual_moves_the_com_over_the_soles():
     target = np.array([0.02, -0.01, 0.01])
-    flight, command = fly(in_the_air(), 300, target)
+    flight, command = fly(in_the_air(), 300, np.array([*target, 0.0, 0.0]))
     positions, _ = soles(command)
     np.testing.assert_allclose(positions.mean(axis=0), -(REST + target), atol=2e-3)
     np.testing.assert_allclose(flight.setpoint.com_position, REST + target, atol=1e-4)

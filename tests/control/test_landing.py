@@ -17,13 +17,13 @@ from icub_jump_env.control.landing import FeedbackLanding, HoldLanding
 from icub_jump_env.control.phases import Tick
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.readings import Readings
-from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.planning.residual import N_AXES, ResidualFilter
 from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 DT = 0.005
 PLAN = ScaledCurvePlan(plan_com_trajectory(0.04), ROBOT, STANCE)
-NOTHING = np.zeros(3)
+NOTHING = np.zeros(N_AXES)
 WEIGHT = 324.0
 PITCH, ROLL = (
     [ROBOT.joint_names.index(f"{side}_ankle_{axis}") for side in "lr"]
@@ -336,7 +336,7 @@ class TestFeedbackLanding:
     def test_a_residual_moves_the_com_that_it_stands_over(self):
         lander = Lander()
         for k in range(200):
-            lander.tick(k * DT, np.array([0.02, 0.0, 0.01]))
+            lander.tick(k * DT, np.array([0.02, 0.0, 0.01, 0.0, 0.0]))
         np.testing.assert_allclose(
             lander.landing.setpoint.com_position[:2], [landing.STAND_AHEAD + 0.02, 0.0], atol=1e-5
         )
@@ -345,7 +345,7 @@ class TestFeedbackLanding:
 
     def test_the_filter_keeps_its_state_through_touch_down(self):
         lander = Lander()
-        lander.residual.step(np.array([0.02, 0.0, 0.0]), 0.1)
+        lander.residual.step(np.array([0.02, 0.0, 0.0, 0.0, 0.0]), 0.1)
         offset = lander.residual.offset.copy()
         lander.landing.start(lander.stander.state, PLAN, 2.0)
         np.testing.assert_array_equal(lander.residual.offset, offset)

@@ -166,7 +166,7 @@ def test_models_are_given_by_name_or_json():
         (["--jump-height", "high"], ["--jump-height", "'high'"]),
         (["--jump-height", "7"], ["jump_height", "7", "0.01 to 0.15"]),
         (["--controller", "psychic"], ["--controller", "psychic", "velocity"]),
-        (["--residual-scale", "1"], ["--residual-scale", "FLOAT FLOAT FLOAT"]),
+        (["--residual-scale", "1"], ["residual_scale", "1.0", "lateral from 0 to 0.1 m"]),
         (["--timestep", "nan"], ["timestep", "nan"]),
         (["--control-frequency", "333"], ["control_frequency", "333", "divisor"]),
         (["--episodes", "0"], ["episodes", "0", "from 1 to 1000000"]),

@@ -13,7 +13,7 @@ from experiments import rivals
 from experiments.rivals import best_constant, constant_shift, open_loop
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
-from icub_jump_env.observation import entry_scales
+from icub_jump_env.observation import DEFAULT
 from icub_jump_env.policy import NetworkPolicy
 
 CONFIG = TASK.replace(stand_time=0.1)
@@ -113,4 +113,4 @@ def test_a_fall_in_the_launch_leaves_the_remaining_steps_zero():
     (table,) = open_loop(sideways, config, CONSOLE, seeds=(0,)).actions
     assert table[0].tolist() == [0, 1, 0]
     assert not table[-1].any()
-    assert entry_scales()["time"] == 1.0  # as clock() has it
+    assert DEFAULT.scales["time"] == 1.0  # as clock() has it

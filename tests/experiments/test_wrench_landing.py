@@ -126,13 +126,13 @@ def test_without_a_solution_the_torques_fade():
     env.reset(seed=SEED)
     landing = landing_by_wrenches(env, WrenchGains(impact=0.0))
     landing.start(env._state, env._controller.plan, 0.0)
-    held = landing.tick(env._state, 0.0, np.zeros(3))
+    held = landing.tick(env._state, 0.0, np.zeros(5))
     before = landing.torque.copy()
     assert not held.report.failed
     assert np.abs(before).max() > 1.0
     failed = IDLE._replace(status=QPStatus.INFEASIBLE)
     landing._wrench_solver.solve = lambda: (None, failed)
-    failed = landing.tick(env._state, 0.005, np.zeros(3))
+    failed = landing.tick(env._state, 0.005, np.zeros(5))
     assert failed.report.failed
     np.testing.assert_allclose(landing.torque, 0.9 * before)
     assert np.abs(failed.command.torque - landing.torque).max() < 1.0

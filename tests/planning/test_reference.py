@@ -5,11 +5,17 @@ import pytest
 
 from icub_jump_env.planning.plan import Setpoint
 from icub_jump_env.planning.reference import Reference
-from icub_jump_env.planning.residual import ResidualFilter
+from icub_jump_env.planning.residual import N_AXES, ResidualFilter
 from icub_jump_env.robot.statics import Stance
 
 START = np.array([0.02, 0.001, 0.39])
-ADDED = {"com_position": "offset", "com_velocity": "velocity", "com_acceleration": "acceleration"}
+ADDED = {
+    "com_position": "offset",
+    "com_velocity": "velocity",
+    "com_acceleration": "acceleration",
+    "angular_momentum": "offset",
+    "angular_momentum_rate": "velocity",
+}
 
 
 class Moving:
@@ -41,10 +47,13 @@ def parts(setpoint):
 @pytest.mark.parametrize("time", [0.0, 0.3])
 def test_it_is_the_plan_from_the_start_plus_the_residual(reference, time):
     residual = reference.residual
-    residual.step(np.array([0.03, -0.01, 0.02]), 0.1)
+    residual.step(np.array([0.03, -0.01, 0.02, 0.4, -0.5]), 0.1)
     reference.update(time)
     for name, planned in parts(Moving().sample(time)).items():
-        expected = planned + (getattr(residual, ADDED[name]) if name in ADDED else 0.0)
+        expected = planned
+        if name in ADDED:
+            of_com, of_momentum = np.split(getattr(residual, ADDED[name]), [3])
+            expected = planned + (of_com if "com" in name else [*of_momentum, 0.0])
         if name == "com_position":
             expected = expected + START
         np.testing.assert_allclose(parts(reference.setpoint)[name], expected, rtol=1e-15)
@@ -52,7 +61,7 @@ def test_it_is_the_plan_from_the_start_plus_the_residual(reference, time):
 
 
 def test_start_forgets_the_residual_and_the_plan_before(reference):
-    reference.residual.step(np.ones(3), 0.1)
+    reference.residual.step(np.ones(N_AXES), 0.1)
     reference.update(0.2)
     reference.start(Moving(), 2 * START)
     residual = reference.residual

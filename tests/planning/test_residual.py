@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from icub_jump_env.planning.residual import ResidualConfig, ResidualFilter
+from icub_jump_env.planning.residual import N_AXES, ResidualConfig, ResidualFilter
 
-targets = st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3).map(np.array)
+targets = st.lists(st.floats(-0.1, 0.1), min_size=N_AXES, max_size=N_AXES).map(np.array)
 
 
 def state(residual):
@@ -16,7 +16,7 @@ def state(residual):
 def test_zero_stays_exactly_zero():
     residual = ResidualFilter(15.0)
     for _ in range(1000):
-        residual.step(np.zeros(3), 0.005)
+        residual.step(np.zeros(N_AXES), 0.005)
     assert not state(residual).any()
 
 
@@ -60,13 +60,13 @@ def test_reaches_the_target_without_overshoot(target):
 
 def test_a_step_is_90_percent_done_after_0_26_s_at_the_default_bandwidth():
     residual = ResidualFilter(ResidualConfig().bandwidth)
-    residual.step(np.ones(3), 0.26)
+    residual.step(np.ones(N_AXES), 0.26)
     np.testing.assert_allclose(residual.offset, 0.9, atol=0.005)
 
 
 def test_twice_the_bandwidth_is_twice_as_fast():
     slow, fast = ResidualFilter(10.0), ResidualFilter(20.0)
-    slow.step(np.ones(3), 0.1)
-    fast.step(np.ones(3), 0.05)
+    slow.step(np.ones(N_AXES), 0.1)
+    fast.step(np.ones(N_AXES), 0.05)
     np.testing.assert_allclose(fast.offset, slow.offset, atol=1e-12)
     np.testing.assert_allclose(fast.velocity, 2 * slow.velocity, atol=1e-12)

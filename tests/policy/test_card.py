@@ -35,7 +35,7 @@ def make_card(**changes):
         "hidden": policy.hidden,
         "axes": policy.axes,
         "action_scale": policy.action_scale,
-        "observation": tuple(observation.entry_scales().items()),
+        "observation": tuple(observation.DEFAULT.scales.items()),
         **DETAILS,
     }
     return PolicyCard(**(values | changes))
@@ -79,7 +79,7 @@ def test_the_content_is_plain():
     assert content["format"] == 1
     assert content["inputs"] == ["gyro.y", "phase.launch", "time"]
     assert content["observation"][2] == ["phase.landing", 1.0]
-    assert content["config"]["residual"]["scale"] == [0.06, 0.02, 0.02]
+    assert content["config"]["residual"]["scale"] == [0.06, 0.02, 0.02, 1.0, 1.5]
     assert content["results"] == {
         "success": {"full": 0.83, "interval": [0.77, 0.88]},
         "rise": None,
@@ -185,7 +185,8 @@ OTHERS = {
     "com_displacement": 0.1,
     "com_scaling": "acceleration",
     "momentum_control": False,
-    "residual_scale": (0.05, 0.02, 0.02),
+    "residual_axes": ("forward", "vertical"),
+    "residual_scale": (0.05, 0.02, 0.02, 1.0, 1.5),
     "control_frequency": 100.0,
     "agent_frequency": 50.0,
     "ankle_shift": False,
@@ -261,7 +262,7 @@ def test_the_fields_are_sorted_into_two_kinds_with_none_forgotten():
     free = {
         "jump_height", "jumps", "plans", "solver", "timestep", "self_collision", "physics_loop",
         "actuators", "sensors", "command_delay", "randomization", "reward", "success", "stand_time", "early_end",
-        "rendering", "render_mode", "width", "height", "camera", "residual",
+        "rendering", "render_mode", "width", "height", "camera", "residual", "observation",
     }  # fmt: skip
     of_the_controller = {"constraints", "launch_end"}
     names = {f.name for kind in (JumpConfig, Shortcuts) for f in dataclasses.fields(kind)}
@@ -269,7 +270,7 @@ def test_the_fields_are_sorted_into_two_kinds_with_none_forgotten():
 
 
 def test_the_layout_must_match_by_name():
-    entries = observation.entry_scales()
+    entries = dict(observation.DEFAULT.scales)
     check_match(make_card(observation=tuple(reversed(entries.items()))), JumpConfig())
     del entries["foot_force.left"]
     changed = entries | {"gyro.y": 3.0, "wind": 1.0}
@@ -309,7 +310,7 @@ FLAT = {
 def test_a_card_without_groups_is_read_and_is_of_the_robot_there_was():
     card = make_card(config=FLAT)
     assert card.config == JumpConfig.of(**FLAT)
-    assert card.config.residual.scale == (0.05, 0.02, 0.01)
+    assert card.config.residual.scale == (0.05, 0.02, 0.01, 1.0, 1.5)
     assert card.config.success.stand_time == 1.5
     assert not card.config.controller_config.momentum_control
     assert card.config.controller_config.solver == "osqp"

@@ -11,8 +11,9 @@ from policies import POLICIES, make_network, random_observation
 
 from icub_jump_env import observation
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.planning.residual import COM_AXES as AXES
 from icub_jump_env.policy import Baseline, NetworkPolicy
-from icub_jump_env.policy.fields import AXES, MAX_HIDDEN, MAX_WIDTH
+from icub_jump_env.policy.fields import MAX_HIDDEN, MAX_WIDTH
 from icub_jump_env.policy.network import WEIGHT_LIMIT
 
 ENTRIES = [
@@ -37,7 +38,7 @@ def by_hand(policy, obs):
 
 
 def test_entries_have_the_names_of_the_documentation():
-    assert list(observation.entry_scales()) == ENTRIES
+    assert list(observation.DEFAULT.scales) == ENTRIES
     assert len(set(ENTRIES)) == observation.SIZE == 80
 
 

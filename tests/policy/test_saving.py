@@ -17,7 +17,7 @@ from icub_jump_env.errors import (
     PolicyFileError,
     PolicyMismatchError,
 )
-from icub_jump_env.observation import entry_scales
+from icub_jump_env.observation import DEFAULT
 from icub_jump_env.policy import ReplayPolicy, load_policy, save_policy, shipped_policies
 from icub_jump_env.policy.fields import MAX_HIDDEN, MAX_WIDTH
 from icub_jump_env.policy.replay import MAX_COMMANDS, MAX_STEPS
@@ -78,7 +78,7 @@ def test_saved_again_the_files_are_the_same(path):
 
 
 def test_the_largest_policies_can_be_read(tmp_path):
-    network = make_network(tuple(entry_scales()), (MAX_WIDTH,) * MAX_HIDDEN)
+    network = make_network(tuple(DEFAULT.scales), (MAX_WIDTH,) * MAX_HIDDEN)
     table = ReplayPolicy(
         np.linspace(0.01, 0.15, MAX_COMMANDS, dtype=np.float32),
         np.zeros((MAX_COMMANDS, MAX_STEPS, 3), np.float32),
@@ -109,7 +109,7 @@ def test_another_environment_is_refused(path):
 
 
 def test_another_layout_is_named_even_if_inputs_are_gone(path):
-    entries = {**entry_scales(), "wind": 1.0}
+    entries = {**DEFAULT.scales, "wind": 1.0}
     rewrite(path, observation=list(entries.items()), inputs=["wind"])
     with pytest.raises(PolicyMismatchError, match=r"observation\.wind=None instead of 1\.0"):
         load_policy(path, JumpConfig())

@@ -124,6 +124,15 @@ class QPReport(NamedTuple):
         """Whether the solution was not applied."""
         return self.status not in (QPStatus.SOLVED, QPStatus.IDLE)
 
+    def as_dict(self) -> dict[str, str | float]:
+        """The entries of an environment's ``info``."""
+        return {
+            "solver_status": str(self.status),
+            "solver_primal_residual": self.residuals.primal,
+            "solver_dual_residual": self.residuals.dual,
+            "solver_gap": self.residuals.gap,
+        }
+
 
 def worse(first: QPReport, second: QPReport) -> QPReport:
     """The report that tells of a failure, else the one with the larger residuals."""

@@ -15,7 +15,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.failures import Failure, failure_in
 from icub_jump_env.planning.plan import JumpPlan
-from icub_jump_env.policy import BASELINE, Policy
+from icub_jump_env.policy import BASELINE, Baseline, Policy
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 from icub_jump_env.snapshot import Snapshot
 
@@ -101,6 +101,7 @@ def run_episode(
     observation, info = env.reset(seed=seed)
     world = info["world"]
     terminated, total = False, 0.0
+    still = np.zeros(env.action_space.shape or (), np.float32)
     for step in itertools.count():
         if trace:
             snapshots.append(env.snapshot())
@@ -109,7 +110,7 @@ def run_episode(
         if terminated:
             break
         if step % hold == 0:
-            action = policy(observation)
+            action = still if isinstance(policy, Baseline) else policy(observation)
         observation, reward, terminated, _, info = env.step(action)
         total += reward
     return Episode(
