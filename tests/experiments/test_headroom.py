@@ -1,0 +1,83 @@
+"""The measurement of the headroom: what counts, and when an action begins."""
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from experiments.headroom import (
+    GRID,
+    REGIMES,
+    Shift,
+    Start,
+    constants,
+    follow,
+    measure,
+    one,
+    render,
+    robust,
+    starts,
+)
+from experiments.headroom import HeadroomOptions as Options
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.observation import DEFAULT
+from icub_jump_env.planning.residual import AXES
+
+
+def seen(time):
+    observation = np.zeros(DEFAULT.size, np.float32)
+    observation[DEFAULT.slices["time"]] = time
+    return observation
+
+
+def test_a_shift_begins_at_its_time():
+    shift = Shift((0.1, 0.2), 0.25)
+    assert not shift(seen(0.24)).any()
+    np.testing.assert_allclose(shift(seen(0.25)), [0.1, 0.2], rtol=1e-6)
+
+
+def test_hindsight_wants_two_neighbours():
+    success = {key: np.zeros(4, bool) for key in constants()}
+    success["forward", 0.2][:] = True, True, True, False
+    success["forward", 0.4][:] = True, False, False, False
+    success["forward", 0.8][:] = False, True, False, False  # no neighbour of 0.2
+    success["pitch", 0.0][:] = False, False, True, False
+    success["pitch", 0.5][:] = False, False, True, False
+    assert robust(success).tolist() == [True, False, True, False]
+
+
+def test_the_law_is_a_line_within_the_range():
+    start = Start((0.05, -0.5), 0.1)
+    assert follow(("forward", 0.2, -2.0), start).action == pytest.approx(one("forward", 0.1))
+    assert follow(("pitch", 0.2, -2.0), start).action == pytest.approx(one("pitch", 0.1))
+    assert follow(("lateral", 0.0, 3.0), start).action == one("lateral", -1.0)
+
+
+def test_zero_is_in_the_grid_of_each_axis():
+    assert set(GRID) == set(AXES)
+    assert all(0.0 in values for values in GRID.values())
+
+
+def test_pushes_begin_within_the_launch():
+    config = JumpConfig.of(**REGIMES["disturbed"])
+    begun = starts(config, range(3))
+    assert len({start.lean for start in begun}) == 3
+    assert all(0.0 <= start.push <= 0.5 for start in begun)
+
+
+def test_a_small_measurement_is_told(monkeypatch):
+    monkeypatch.setattr("experiments.headroom.GRID", {"forward": (0.0, 0.1), "pitch": (0.0, 0.1)})
+    monkeypatch.setattr("experiments.headroom.LAWS", (("pitch", (0.0,), (-2.0,)),))
+    config = JumpConfig.of(residual_axes=AXES, residual_phases="all", early_end=True)
+    found = measure(config, 2, 1, Console(quiet=True))
+    for name in ("zero", "constant", "law", "hindsight", "after the push"):
+        assert found[name].tolist() == [True, True]
+    console = Console(record=True, width=150)
+    console.print(render(Options(episodes=2), {("full", "velocity"): found}))
+    assert "pitch +0 -2 lean" in console.export_text()
+
+
+@pytest.mark.parametrize("change", [{"jobs": 0}, {"regimes": ("calm",)}, {"env": "ICubJump-v7"}])
+def test_bad_options_are_refused(change):
+    with pytest.raises(ConfigError, match=next(iter(change))):
+        Options(**change)
