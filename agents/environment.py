@@ -41,9 +41,11 @@ WORLD = {
     "lateral_slope": 0.05, "push": 5.0, "push_time": 1.0, "push_direction": 3.0,
     "takeoff_spin": 0.5, "flight_push": 5.0, "flight_push_direction": 3.0, "floor_tilt": 0.05,
     "floor_tilt_lateral": 0.05, "step": 0.02, "edge": 0.02, "landing_push": 5.0,
-    "landing_push_direction": 3.0, "encoder_bias": 0.05,
+    "landing_push_direction": 3.0, "flight_push_time": 0.2, "landing_push_time": 1.0,
+    "encoder_bias": 0.05,
 }  # fmt: skip
-"""What a critic sees of the world, and by what it is divided."""
+"""What a critic sees of the world, and by what it is divided; not what varies from link to link or
+joint to joint, but for the encoders."""
 
 STATE = {
     "com": 0.1, "com_velocity": 1.0, "angular_momentum": 1.0, "base_pitch": 0.2,
@@ -86,7 +88,7 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
         self._scale = 1.0
         self._step = 0
         self._over, self._privileged = False, privileged
-        self._world = np.zeros(0, np.float32)
+        self._world = self._hidden = np.zeros(0, np.float32)
         self._start = np.zeros(3)
         size = len(inputs)
         if privileged:
@@ -125,21 +127,22 @@ class LaunchEnv(gymnasium.Env[Array, Array]):
         while ends and not self._over:
             observation, more, self._over, _, info = self.env.step(np.zeros_like(residual))
             reward += more
-        return self._seen(observation), reward, ends, False, info
+        return self._seen(observation, info["diverged"]), reward, ends, False, info
 
-    def _seen(self, observation: Array) -> Array:
+    def _seen(self, observation: Array, diverged: bool = False) -> Array:
         """What the agent sees and, behind it, what its critic does."""
         chosen = observation[self._columns]
         if not self._privileged:
             return chosen
-        truth = self.env.snapshot()
-        start = {"com": self._start}
-        state = [
-            np.ravel((getattr(truth, name) - start.get(name, 0.0)) / scale)
-            for name, scale in STATE.items()
-        ]
-        both = np.concatenate((chosen, self._world, *state))
-        seen: Array = np.clip(both, -OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
+        if not diverged:
+            truth, start = self.env.snapshot(), {"com": self._start}
+            state = [
+                np.ravel((getattr(truth, name) - start.get(name, 0.0)) / scale)
+                for name, scale in STATE.items()
+            ]
+            self._hidden = np.concatenate((self._world, *state)).astype(np.float32)
+        both = np.concatenate((chosen, self._hidden))
+        seen: Array = np.clip(both, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
         return seen
 
     def evaluate(self, policy: Policy, seeds: Sequence[int]) -> list[Episode]:

@@ -126,7 +126,8 @@ class TrainOptions:
         shortcuts: Fields inside its groups; they end up there.
         ppo: How PPO learns.
         inputs: What the policy sees: the whole observation, or command and time alone.
-        axes: Axes of the action that it uses.
+        axes: Axes of the action that it uses; by default forward and vertical, as far as the action
+            has them, else all that it has.
         critic: What the value function sees in training: the same, or the world and the true state,
             too.
         timesteps: Steps of the launch to learn from; an episode has about 35.
@@ -150,7 +151,7 @@ class TrainOptions:
     shortcuts: Annotated[Shortcuts, tyro.conf.arg(name="")] = field(default_factory=Shortcuts)
     ppo: PPOOptions = field(default_factory=PPOOptions)
     inputs: Inputs = "all"
-    axes: tuple[AxisName, ...] = ("forward", "vertical")
+    axes: tuple[AxisName, ...] = ()
     critic: Critic = "observation"
     timesteps: int = 100_000
     seed: int = 0
@@ -166,7 +167,9 @@ class TrainOptions:
         store(self, env=self.env.replace(**vars(self.shortcuts)), shortcuts=Shortcuts())
         check_choice("inputs", self.inputs, get_args(Inputs))
         check_choice("critic", self.critic, get_args(Critic))
-        store(self, axes=check_axes(self.axes, self.env.residual.axes))
+        there_are = self.env.residual.axes
+        usual = tuple(axis for axis in ("forward", "vertical") if axis in there_are)
+        store(self, axes=check_axes(self.axes or usual or there_are, there_are))
         check_count("timesteps", self.timesteps, 1, 1_000_000_000, "steps")
         check_count("seed", self.seed, 0, LARGEST_SEED)
         check_count("jobs", self.jobs, 1, 1000, "processes")

@@ -116,7 +116,7 @@ class ThreadVecEnv(DummyVecEnv):
         return super().reset()
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Take the steps, (num_envs, 3) actions; ``step_wait`` returns the results."""
+        """Take the steps, (num_envs, n) actions; ``step_wait`` returns the results."""
         super().step_async(actions)
         self._threads.go_ahead(actions)
 

@@ -69,11 +69,10 @@ def serve(what: str, controller: str) -> None:
     noise, ticks, estimates, active = 0.0, [], [], []
     if name == "training":
         from agents.environment import LaunchEnv
-        from agents.options import TASK
-        from icub_jump_env.observation import DEFAULT
+        from agents.options import TASK, TrainOptions
 
-        task = TASK.replace(controller=controller)
-        env, noise = LaunchEnv(task, tuple(DEFAULT.scales), ("forward", "vertical")), 0.6
+        options = TrainOptions(env=TASK.replace(controller=controller))
+        env, noise = LaunchEnv(options.env, options.input_names, options.axes), 0.6
     else:
         env = gymnasium.make(name, controller=controller, **keywords).unwrapped
     if what not in CASES:

@@ -85,7 +85,7 @@ def check_seed(seed: Any) -> int | None:
     return None if seed is None else check_count("seed", seed, 0)
 
 
-def check_action(action: Any, size: int = 3) -> NDArray[np.float64]:
+def check_action(action: Any, size: int) -> NDArray[np.float64]:
     """Refuse anything but finite numbers; return them, clipped to [-1, 1], as float64."""
     allowed = f"{size} finite numbers, which are clipped to [-1, 1]"
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
 
 import gymnasium
@@ -21,8 +20,9 @@ from icub_jump_env.estimation.imu import ImuEstimator
 from icub_jump_env.estimation.readings import LOADED
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.metrics.series import SeriesRecorder
-from icub_jump_env.observation import OBSERVATION_LIMIT
+from icub_jump_env.observation import OBSERVATION_LIMIT, Memory
 from icub_jump_env.planning.plan import JumpPlan
+from icub_jump_env.planning.residual import COM_AXES
 from icub_jump_env.reward import reward_terms
 from icub_jump_env.robot.collision import TOLERANCE
 from icub_jump_env.robot.frames import mujoco_qpos
@@ -39,7 +39,7 @@ LOOK_PERIOD = 0.01
 
 
 class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """The iCub jumps from a crouch; an agent may shift the CoM reference meanwhile.
+    """The iCub jumps from a crouch; an agent may shift the set point meanwhile.
 
     ## Description
     The controller of Bergonti, Fiorio and Pucci ("Torque and velocity controllers to
@@ -50,14 +50,14 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     action zero is the pure controller, bit for bit.
 
     ## Action space
-    ``Box(-1, 1, (3,), float32)``: target offset of the CoM reference in units of
-    ``residual_scale``, forward, lateral and vertical, world frame. A critically damped
-    filter turns it into a consistent offset, velocity and acceleration. It acts in the
+    ``Box(-1, 1, (n,), float32)``: target offset of the set point along each of ``residual_axes`` in
+    units of ``residual_scale``, world frame; by default the CoM forward, to the left and up. A
+    critically damped filter turns it into a consistent offset, velocity and acceleration. It acts in the
     launching phase, or in all (``residual_phases``). One step lasts ``dt`` = 0.01 s by
     default.
 
     ## Observation space
-    ``Box(-10, 10, (SIZE,), float32)``: sensor readings, estimates made of them, the
+    ``Box(-10, 10, (layout.size,), float32)``: sensor readings, estimates made of them, the
     command and the phase; entry by entry in :mod:`icub_jump_env.observation` and
     docs/environment.md. No privileged state. Times are those of the present jump.
 
@@ -75,7 +75,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Terminates on a fall (anything but the soles touches the floor, or the chest tilts
     more than 60 deg), without take-off by T + 0.5 s, without the next jump 3 s after a touch-down,
     ``stand_time`` after the last touch-down, or when the simulation diverges. ``info["outcome"]``
-    says which. The TimeLimit of the registration only guards.
+    says which; with ``early_end`` it may be foreseen. The TimeLimit of the registration only guards.
 
     ## Info
     At reset, what was drawn: ``world`` (:class:`icub_jump_env.simulation.randomization.World`)
@@ -151,13 +151,14 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             cfg.controller_config, cfg.residual, kinematics, cfg.flight, cfg.landing
         )
         self._moves = cfg.residual.matrix
+        self._of_momentum = self._moves[len(COM_AXES) :].any(axis=0)
         self._state: RobotState
         self._start_com = np.zeros(3)
         self._heights: tuple[float, ...] = ()
         self._outcome = "not reset"
         self._report = IDLE
         self._observation = np.zeros(self.layout.size, np.float32)
-        self._earlier: deque[NDArray[np.float32]] = deque()
+        self._memory = Memory(cfg.agent_frequency)
         self._renderer = make_renderer(self._simulation.physics, self.config.rendering)
 
     @property
@@ -203,7 +204,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._next_look = 0.0
         self._outcome = "running"
         self._report = IDLE
-        self._earlier.clear()
+        self._memory.forget()
         self._observe()
         if self.render_mode == "human":
             self.render()
@@ -229,6 +230,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         action64 = check_action(action, len(self.config.residual.axes))
         if not self._controller.residual_acts(self._simulation.physics.data.time):
             action64[:] = 0.0  # has no effect and costs nothing
+        elif not self._controller.launching:
+            action64[self._of_momentum] = 0.0
         target = self._moves @ action64
         self._report = IDLE
         already_over, before = self._outcome != "running", self._series.begun
@@ -372,7 +375,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "cop": readings.cop.ravel(),
             "contact": (readings.foot_force > LOADED).astype(float),
         }
-        self._observation = self.layout.encode(values, self._earlier)
+        self._observation = self.layout.encode(values, self._memory)
 
     def _info(self) -> dict[str, Any]:
         series, jumps = self._series, self._series.jumps

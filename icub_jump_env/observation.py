@@ -93,11 +93,13 @@ BLOCKS: tuple[Block, ...] = (
 
 HISTORY_BLOCKS = (
     "com_offset", "com_velocity", "angular_momentum", "gravity", "gyro", "foot_force",
-    "residual_offset", "cop",
+    "residual_offset", "residual_momentum", "cop",
 )  # fmt: skip
 """What is shown of earlier steps, too, as far as it is shown at all."""
 
 MAX_HISTORY = 16
+HISTORY_PERIOD = 0.01
+"""Time between two of the steps that are remembered (s), or the longer one between two actions."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,8 @@ class ObservationConfig:
     Attributes:
         cop: Show the centre of pressure under each sole.
         contacts: Show which soles carry load.
-        history: How many earlier steps to show the CoM, momentum, IMU, feet and residual of.
+        history: How many earlier steps, 10 ms apart, to show the CoM, momentum, IMU, feet and
+            residual of.
 
     Raises:
         ConfigError: If a value is out of range.
@@ -121,6 +124,31 @@ class ObservationConfig:
         for name in ("cop", "contacts"):
             store(self, **{name: check_flag(name, getattr(self, name))})
         store(self, history=check_count("history", self.history, 0, MAX_HISTORY, "steps"))
+
+
+class Memory:
+    """What is remembered of earlier steps of an episode."""
+
+    def __init__(self, agent_frequency: float = 1.0 / HISTORY_PERIOD) -> None:
+        """Remember nothing; steps come at ``agent_frequency`` (Hz)."""
+        self._every = max(1, round(HISTORY_PERIOD * agent_frequency))
+        self.forget()
+
+    def forget(self) -> None:
+        """An episode begins."""
+        self._frames: deque[NDArray[np.float32]] = deque()
+        self._shown = 0
+
+    def recall(self, frame: NDArray[np.float32], history: int) -> tuple[NDArray[np.float32], ...]:
+        """The earlier frames, the latest first; from now on ``frame`` may be one of them."""
+        if not self._frames:
+            self._frames.extend([frame] * history)
+        frames = tuple(self._frames)
+        if self._shown % self._every == 0:
+            self._frames.pop()
+            self._frames.appendleft(frame)
+        self._shown += 1
+        return frames
 
 
 class Layout:
@@ -176,14 +204,14 @@ class Layout:
     def encode(
         self,
         values: Mapping[str, NDArray[np.float64] | float],
-        earlier: deque[NDArray[np.float32]],
+        memory: Memory,
     ) -> NDArray[np.float32]:
         """Assemble, scale and clip an observation.
 
         Args:
             values: The value of each block of the present by name, in SI units.
-            earlier: What is remembered of earlier steps, to which this adds the present one; if
-                it is empty, the present stands for them.
+            memory: What is remembered of earlier steps; if it is empty, the present stands for
+                them.
 
         Returns:
             (size,) entries of the observation space.
@@ -196,11 +224,9 @@ class Layout:
         if not self._history:
             return present
         frame = present[self._remembered]
-        if not earlier:
-            earlier.extend([frame] * self._history)
-        whole: NDArray[np.float32] = np.concatenate((present, *earlier))
-        earlier.pop()
-        earlier.appendleft(frame)
+        whole: NDArray[np.float32] = np.concatenate(
+            (present, *memory.recall(frame, self._history))
+        )
         return whole
 
 

@@ -52,7 +52,7 @@ def reward_terms(
 
     Args:
         ended: The jumps that ended with this step.
-        action: (3,) action in [-1, 1].
+        action: The action, in [-1, 1].
         weights: Weights of the terms.
 
     Returns:

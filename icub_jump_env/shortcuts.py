@@ -28,8 +28,8 @@ class Shortcuts:
             default 200 for the velocity controller and 500 for the torque controller.
         launch_end: Whether the launch ends at T or at lift-off alone.
         residual_axes: What an action moves: some of forward, lateral, vertical, roll, pitch.
-        residual_scale: What an action of 1 moves each of these by: the CoM (m), and its angular
-            momentum (kg m^2/s).
+        residual_scale: What an action of 1 moves forward, lateral, vertical (m), roll and pitch
+            (kg m^2/s) by; the last two may be left out.
         residual_bandwidth: Natural frequency of the filter that shapes the residual (rad/s).
         residual_phases: Whether the residual acts in the launch alone or in all phases.
         stand_time: How long the robot must stand after touch-down (s).

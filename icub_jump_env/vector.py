@@ -136,7 +136,7 @@ class ICubJumpVectorEnv(SyncVectorEnv):
                 ``reset_mask``, (num_envs,) bool, says which are reset.
 
         Returns:
-            Observations, (num_envs, SIZE), and info.
+            Observations, (num_envs, size), and info.
 
         Raises:
             ConfigError: If a seed or an option is unknown or out of range.
@@ -149,10 +149,10 @@ class ICubJumpVectorEnv(SyncVectorEnv):
         """Advance each environment by ``dt``, or reset it if its episode was over.
 
         Args:
-            actions: (num_envs, 3) in [-1, 1]; what lies beyond is clipped.
+            actions: (num_envs, n), those of each, in [-1, 1]; what lies beyond is clipped.
 
         Returns:
-            Observations, (num_envs, SIZE); rewards, terminated and truncated, (num_envs,); info.
+            Observations, (num_envs, size); rewards, terminated and truncated, (num_envs,); info.
 
         Raises:
             ActionError: If an action is misshapen or not finite; no environment has moved.

@@ -70,6 +70,15 @@ class TestAction:
         wanted = 0.5 * ResidualConfig().scale[AXES.index(axis)]
         assert momenta[0.5][row] - momenta[0.0][row] == pytest.approx(wanted, rel=0.35)
 
+    def test_after_the_launch_the_momentum_costs_and_shows_nothing(self):
+        seen, _, env = play(1.0, residual_axes=("pitch",), residual_phases="all")
+        assert not env._controller.launching
+        where = env.layout.slices["residual_momentum"]
+        assert seen[30, where][1] > 0.5
+        assert abs(seen[-1, where]).max() < 1e-3
+        *_, info = env.step([1.0])
+        assert info["reward_residual"] == 0.0
+
     def test_the_scale_of_the_momentum_may_be_left_out(self):
         assert ResidualConfig((0.01, 0.02, 0.03)).scale[3:] == ResidualConfig().scale[3:]
         assert ResidualConfig((0.01, 0.02, 0.03, 4.0)).scale == (0.01, 0.02, 0.03, 4.0, 1.5)
@@ -117,12 +126,26 @@ class TestObservation:
 
     def test_the_history_is_what_was_seen(self):
         seen, _, env = play(0.2, steps=30, observation=ObservationConfig(cop=True, history=3))
-        for name in HISTORY_BLOCKS:
+        for name in set(HISTORY_BLOCKS) & set(env.layout.slices):
             now = seen[:, env.layout.slices[name]]
             for steps in (1, 2, 3):
                 before = seen[:, env.layout.slices[f"{name}@{steps}"]]
                 np.testing.assert_array_equal(before[steps:], now[:-steps])
                 np.testing.assert_array_equal(before[:steps], now[[0] * steps])
+
+    def test_steps_between_those_of_a_policy_are_not_remembered(self):
+        """Stepped faster, with the same actions, the robot remembers the same."""
+        slow, fast = (
+            ICubJumpEnv(agent_frequency=rate, observation={"history": 2})
+            for rate in (100.0, 200.0)
+        )
+        seen, often = slow.reset(seed=0)[0], fast.reset(seed=0)[0]
+        for k in range(25):
+            np.testing.assert_array_equal(often, seen)
+            action = np.array([0.5, 0.0, -0.5]) * (k % 3)
+            seen = slow.step(action)[0]
+            fast.step(action)
+            often = fast.step(action)[0]
 
     def test_a_reset_forgets(self):
         env = ICubJumpEnv(observation={"history": 2})

@@ -140,7 +140,7 @@ class JumpController:
         Args:
             state: The believed state.
             time: Time since the start of the episode (s).
-            residual_target: (3,) target offset of the residual (m).
+            residual_target: (5,) target offset of the residual (m; kg m^2/s).
 
         Returns:
             The command and how it came about.

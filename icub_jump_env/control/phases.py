@@ -50,7 +50,7 @@ class PhaseController(Protocol):
         Args:
             state: The believed state.
             time: Time since the start of the jump (s).
-            residual_target: (3,) target offset of the residual (m).
+            residual_target: (5,) target offset of the residual (m; kg m^2/s).
         """
         ...
 

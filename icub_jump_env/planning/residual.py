@@ -86,7 +86,7 @@ def _check_scale(scale: Any) -> tuple[float, ...]:
         f"{axis} from {low:g} to {high:g} {unit}"
         for axis, (low, high, unit) in zip(AXES, RESIDUAL_RANGES, strict=True)
     )
-    refusal = ConfigError("scale", scale, f"{allowed}; the last two may lack")
+    refusal = ConfigError("scale", scale, f"{allowed}; the last two may be left out")
     listed = isinstance(scale, Sequence) or (isinstance(scale, np.ndarray) and scale.ndim == 1)
     if not listed or not len(COM_AXES) <= len(scale) <= N_AXES:
         raise refusal
@@ -109,8 +109,8 @@ class ResidualFilter(Record):
 
     Attributes:
         offset: (5,) of each of :data:`AXES`, world axes (m; kg m^2/s).
-        velocity: (5,) its rate (1/s).
-        acceleration: (5,) the rate of that (1/s^2).
+        velocity: (5,) its rate (m/s; Nm).
+        acceleration: (5,) the rate of that (m/s^2; Nm/s).
     """
 
     offset: Annotated[Array, (N_AXES,)]

@@ -11,6 +11,7 @@ from typing import Any, Self, get_args
 from icub_jump_env.checks import check_choice, check_count, check_number, check_seed, store
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, PolicyMismatchError
+from icub_jump_env.observation import ObservationConfig
 from icub_jump_env.planning.residual import COM_AXES, AxisName, check_axes
 from icub_jump_env.policy.fields import (
     ACTION_SCALE_RANGE,
@@ -39,6 +40,7 @@ TASK_FIELDS = (
     "com_displacement",
     "com_scaling",
     "momentum_control",
+    "observation",
     "residual_axes",
     "residual_scale",
     "residual_bandwidth",
@@ -61,6 +63,7 @@ BEFORE_THERE_WAS_A_CHOICE = {
     "estimator": "feet_fixed",
     "flight": "minimum_jerk",
     "landing": "hold",
+    "observation": ObservationConfig(),
     "residual_axes": COM_AXES,
 }
 """What holds for cards that do not say these fields."""

@@ -19,9 +19,9 @@ class Policy(Protocol):
         """Choose an action.
 
         Args:
-            observation: (80,) as laid out in :mod:`icub_jump_env.observation`.
+            observation: As laid out in :mod:`icub_jump_env.observation`; 80 entries by default.
 
         Returns:
-            (3,) in [-1, 1]: forward, lateral, vertical; the caller's own.
+            One entry in [-1, 1] for each of ``residual_axes``; the caller's own.
         """
         ...

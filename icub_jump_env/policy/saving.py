@@ -78,6 +78,9 @@ def save_policy(
             policy.agent_frequency,
             f"the environment's {config.agent_frequency}",
         )
+    action_axes = policy.axes if isinstance(policy, ReplayPolicy) else policy.action_axes
+    if action_axes != config.residual.axes:
+        raise ConfigError("axes", action_axes, f"the environment's {config.residual.axes}")
     card = PolicyCard(
         kind=policy.kind,
         observation=tuple(config.layout.scales.items()),

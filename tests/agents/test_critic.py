@@ -53,6 +53,15 @@ def test_it_learns():
     assert all(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
 
 
+def test_a_diverged_simulation_shows_it_nothing_that_is_not_finite():
+    env = LaunchEnv(OPTIONS.env, OPTIONS.input_names, OPTIONS.axes, True)
+    env.reset(seed=0)
+    env.env.data.qvel[12] = np.nan
+    seen, *_, info = env.step(np.zeros(2))
+    assert info["diverged"]
+    assert np.isfinite(seen).all()
+
+
 def test_what_it_sees_is_the_world_and_the_true_state():
     n = len(OPTIONS.input_names)
     plain = LaunchEnv(OPTIONS.env, OPTIONS.input_names, OPTIONS.axes)

@@ -1,7 +1,5 @@
 """Playing back a table of actions."""
 
-from collections import deque
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,7 +15,9 @@ from icub_jump_env.policy.replay import MAX_COMMANDS, MAX_STEPS
 def observe(time, height):
     """An observation in which everything but time and command is one."""
     values = {block.name: np.ones(len(block.labels)) for block in observation.BLOCKS}
-    return observation.DEFAULT.encode(values | {"time": time, "jump_height": height}, deque())
+    return observation.DEFAULT.encode(
+        values | {"time": time, "jump_height": height}, observation.Memory()
+    )
 
 
 @pytest.mark.parametrize("frequency", [10.0, 100.0, 500.0])
