@@ -87,9 +87,11 @@ def serve(what: str, controller: str) -> None:
             active.append(result.report and result.report.iterations > 0)
             return result
 
-        timed(JumpController, "tick", ticks)
-        timed(FeetFixedEstimator, "estimate", estimates)
-        JumpController.tick = noted if what == "which" else JumpController.tick
+        if what == "which":
+            JumpController.tick = noted  # type: ignore[method-assign]
+        else:
+            timed(JumpController, "tick", ticks)
+            timed(FeetFixedEstimator, "estimate", estimates)
     for line in sys.stdin:
         for notes in (ticks, estimates, active):
             notes.clear()

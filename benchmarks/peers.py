@@ -32,6 +32,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.planning.plan import JumpPlan
+from icub_jump_env.planning.residual import N_AXES
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 HERE = Path(__file__).parent / "peer_ticks"
@@ -82,7 +83,7 @@ def write_launch(folder: Path, name: ControllerName) -> None:
     while env._controller.launching:
         found = env._simulation.sensors.readings
         readings.append((found.joint_position.copy(), found.joint_velocity.copy()))
-        env._control_tick(np.zeros(5))
+        env._control_tick(np.zeros(N_AXES))
     plan: JumpPlan = env._controller.plan
     dt, robot = env.config.control_dt, env.robot
     env.close()

@@ -171,6 +171,7 @@ def starts(config: JumpConfig, of_seeds: Sequence[int]) -> list[Start]:
         forward, left = lean_of(readings.gravity, plan.stance)
         push = info["world"]["push_time"] * (plan.duration - PUSH_DURATION)
         found.append(Start((float(forward), float(left)), push))
+    env.close()
     return found
 
 
