@@ -115,8 +115,9 @@ def run(options: ForesightOptions) -> None:
     columns = TextColumn("playing"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     with progress_display(progress, *columns) as display:
         for name, controller, worlds in display.track(rows):
-            config = JumpConfig.of(
-                **VERSIONS[name],
+            # Judged before there was a correction of the lean.
+            config = JumpConfig.of(**VERSIONS[name]).replace(
+                lean_correction=False,
                 controller=controller,
                 randomization=worlds,
                 jump_height=(0.03, 0.06),

@@ -18,7 +18,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,7 @@ from icub_jump_env.simulation.randomization import RANDOMIZATIONS
 from icub_jump_env.versions import VERSIONS, EnvName
 
 Array = NDArray[np.float32]
+Success = NDArray[np.bool_]
 
 HARD, DEG = RANDOMIZATIONS["hard"], math.radians(1.0)
 
@@ -162,6 +163,24 @@ class HeadroomOptions:
             check_choice("regimes", regime, tuple(REGIMES))
 
 
+def configuration(
+    env: EnvName, regime: str, controller: ControllerName, lean_correction: bool
+) -> JumpConfig:
+    """The jumps of a regime, 4 to 6 cm."""
+    displacement = {"com_displacement": 0.09} if env == "ICubJump-v0" else {}
+    together = {
+        **VERSIONS[env],
+        **displacement,
+        **REGIMES[regime],
+        "controller": controller,
+        "jump_height": (0.04, 0.06),
+        "residual_axes": AXES,
+        "early_end": True,
+        "lean_correction": lean_correction,
+    }
+    return JumpConfig.of(**together)
+
+
 def starts(config: JumpConfig, of_seeds: Sequence[int]) -> list[Start]:
     """What episodes begin with."""
     env, found = make_env(config), []
@@ -175,83 +194,94 @@ def starts(config: JumpConfig, of_seeds: Sequence[int]) -> list[Start]:
     return found
 
 
-def one(axis: str, value: float) -> tuple[float, ...]:
-    """An action along one axis."""
-    return tuple(value if name == axis else 0.0 for name in AXES)
+class Line(NamedTuple):
+    """What moves one axis: a constant, or a line over the lean.
+
+    Attributes:
+        axis: That it moves.
+        offset: Action without lean.
+        gain: Action per lean forward, or to the left for the axes across (1/rad).
+        after_push: Whether it begins with the push of the launch only.
+    """
+
+    axis: str
+    offset: float
+    gain: float = 0.0
+    after_push: bool = False
+
+    def policy(self, start: Start) -> Shift:
+        """It in an episode."""
+        lean = start.lean[self.axis in ("lateral", "roll")]
+        action = min(max(self.offset + self.gain * lean, -1.0), 1.0)
+        actions = tuple(action if axis == self.axis else 0.0 for axis in AXES)
+        return Shift(actions, start.push if self.after_push else 0.0)
 
 
-def constants() -> dict[tuple[str, float], tuple[float, ...]]:
+ZERO = Line("forward", 0.0)
+
+
+def constants(after_push: bool = False) -> list[Line]:
     """The grid of actions."""
-    return {(axis, value): one(axis, value) for axis, values in GRID.items() for value in values}
-
-
-def laws() -> list[tuple[str, float, float]]:
-    """Axis, action without lean and gain of each law that is tried."""
     return [
-        (axis, *pair)
+        Line(axis, value, after_push=after_push)
+        for axis, values in GRID.items()
+        for value in values
+    ]
+
+
+def laws() -> list[Line]:
+    """The lines over the lean that are tried."""
+    return [
+        Line(axis, *pair)
         for axis, offsets, gains in LAWS
         for pair in itertools.product(offsets, gains)
     ]
 
 
-def follow(law: tuple[str, float, float], start: Start) -> Shift:
-    """The law in an episode."""
-    axis, offset, gain = law
-    felt = start.lean[0] if axis in ("forward", "pitch") else start.lean[1]
-    return Shift(one(axis, min(max(offset + gain * felt, -1.0), 1.0)))
-
-
-def robust(success: Mapping[tuple[str, float], NDArray[np.bool_]]) -> NDArray[np.bool_]:
+def robust(success: Mapping[Line, Success]) -> Success:
     """Of each episode whether an action and its neighbour of the same axis succeed."""
     pairs = [
-        success[axis, a] & success[axis, b]
-        for axis, values in GRID.items()
-        for a, b in itertools.pairwise(values)
+        success[one] & success[other]
+        for one, other in itertools.pairwise(success)
+        if one.axis == other.axis
     ]
-    found: NDArray[np.bool_] = np.any(pairs, axis=0)
+    found: Success = np.any(pairs, axis=0)
     return found
 
 
 def measure(config: JumpConfig, episodes: int, jobs: int, progress: Console) -> dict[str, Any]:
-    """Success of each arm on the second half of the seeds, and what was chosen on the first."""
-    of_seeds = TUNING[: 2 * episodes]
-    begun = starts(config, of_seeds)
-    grid, tried = constants(), laws()
-    late = {key: action for key, action in grid.items() if key[1] != 0.0}
-    policies: list[tuple[Any, list[Shift]]] = [
-        *((("constant", key), [Shift(action)] * len(begun)) for key, action in grid.items()),
-        *((("law", law), [follow(law, start) for start in begun]) for law in tried),
-        *(
-            (("late", key), [Shift(action, start.push) for start in begun])
-            for key, action in late.items()
-        ),
-    ]
-    work = [
-        Job(config, seed, shift)
-        for _, shifts in policies
-        for seed, shift in zip(of_seeds, shifts, strict=True)
-    ]
-    played = np.array([each.is_success for each in run_all(work, jobs, progress)])
-    success = dict(
-        zip([what for what, _ in policies], played.reshape(len(policies), -1), strict=True)
-    )
-    first, second = slice(0, None, 2), slice(1, None, 2)
+    """Success of each arm on the second half of the seeds, and what was chosen on the first.
 
-    def best(kind: str) -> Any:
-        return max((w for w in success if w[0] == kind), key=lambda w: success[w][first].mean())
+    Hindsight plays only where the zero action fails: elsewhere it has nothing to win.
+    """
+    both = TUNING[: 2 * episodes]
+    first, second = both[0::2], both[1::2]
+    begun = dict(zip(both, starts(config, both), strict=True))
 
-    zero = success["constant", ("forward", 0.0)]
-    constant, law = best("constant"), best("law")
-    from_the_start = {key: success["constant", key] for key in grid}
-    after = {key: success["late", key] if key in late else zero for key in grid}
+    def play(lines: Sequence[Line], on: Sequence[int]) -> dict[Line, Success]:
+        work = [Job(config, seed, line.policy(begun[seed])) for line in lines for seed in on]
+        played = np.array([each.is_success for each in run_all(work, jobs, progress)], bool)
+        return dict(zip(lines, played.reshape(len(lines), len(on)), strict=True))
+
+    def best(lines: Sequence[Line]) -> Line:
+        success = play(lines, first)
+        return max(lines, key=lambda line: (success[line].mean(), -abs(line.offset)))
+
+    constant, law = best(constants()), best(laws())
+    success = play([ZERO, constant, law], second)
+    zero = success[ZERO]
+    lost = [seed for seed, succeeds in zip(second, zero, strict=True) if not succeeds]
+    saved = {}
+    for name, after_push in (("hindsight", False), ("after the push", True)):
+        saved[name] = zero.copy()
+        saved[name][~zero] = robust(play(constants(after_push), lost))
     return {
-        "zero": zero[second],
-        "constant": success[constant][second],
-        "chosen constant": constant[1],
-        "law": success[law][second],
-        "chosen law": law[1],
-        "hindsight": (robust(from_the_start) | zero)[second],
-        "after the push": (robust(after) | zero)[second],
+        "zero": zero,
+        "constant": success[constant],
+        "law": success[law],
+        **saved,
+        "chosen constant": constant,
+        "chosen law": law,
     }
 
 
@@ -265,8 +295,7 @@ def render(
         title=f"Success, %, {options.env}, 4 to 6 cm, {seeds(TUNING[: 2 * options.episodes])}, every other",
     )  # fmt: skip
     for (regime, controller), found in results.items():
-        axis, value = found["chosen constant"]
-        of, offset, gain = found["chosen law"]
+        constant, law = found["chosen constant"], found["chosen law"]
         percent = {
             name: f"{100 * np.mean(values):.0f}"
             for name, values in found.items()
@@ -274,8 +303,8 @@ def render(
         }
         table.add_row(
             regime, controller, percent["zero"],
-            percent["constant"], f"{axis} {value:+g}",
-            percent["law"], f"{of} {offset:+g} {gain:+g} lean",
+            percent["constant"], f"{constant.axis} {constant.offset:+g}",
+            percent["law"], f"{law.axis} {law.offset:+g} {law.gain:+g} lean",
             percent["hindsight"], percent["after the push"],
         )  # fmt: skip
     return table
@@ -286,16 +315,7 @@ def run(options: HeadroomOptions) -> None:
     console, progress = Console(), Console(stderr=True)
     results = {}
     for regime, controller in itertools.product(options.regimes, CONTROLLERS):
-        displacement = {"com_displacement": 0.09} if options.env == "ICubJump-v0" else {}
-        config = JumpConfig.of(
-            **VERSIONS[options.env],
-            **displacement,
-            **REGIMES[regime],
-            controller=controller,
-            jump_height=(0.04, 0.06),
-            residual_axes=AXES,
-            early_end=True,
-        )
+        config = configuration(options.env, regime, controller, lean_correction=False)
         results[regime, controller] = measure(config, options.episodes, options.jobs, progress)
     show(console, render(options, results))
 

@@ -100,6 +100,7 @@ class JumpConfig(WithShortcuts):
             final CoM acceleration of -9.81 m/s^2.
         estimator: Where the state comes from: the paper's assumption that the feet stand still,
             or the IMU as far as they do not.
+        lean_correction: Correct the launch by the lean that the IMU feels as a jump begins.
         flight: Minimum jerk to the landing posture, or soles placed by feedback.
         landing: Hold the posture, or catch by feedback.
         residual: How actions move the reference.
@@ -134,6 +135,7 @@ class JumpConfig(WithShortcuts):
     com_displacement: float | None = None
     com_scaling: ComScaling = "displacement"
     estimator: EstimatorName = "feet_fixed"
+    lean_correction: bool = False
     flight: FlightName = "minimum_jerk"
     landing: LandingName = "hold"
     residual: ResidualConfig = field(default_factory=ResidualConfig)
@@ -151,7 +153,7 @@ class JumpConfig(WithShortcuts):
     rendering: RenderConfig = field(default_factory=RenderConfig)
 
     def __post_init__(self) -> None:
-        for name in ("ankle_shift", "self_collision"):
+        for name in ("ankle_shift", "lean_correction", "self_collision"):
             store(self, **{name: check_flag(name, getattr(self, name))})
         check_type("robot", self.robot, str)
         load_robot(self.robot, self.ankle_shift)
@@ -170,10 +172,8 @@ class JumpConfig(WithShortcuts):
             )
             store(self, com_displacement=displacement)
         store(self, timestep=check_number("timestep", self.timestep, *TIMESTEP_RANGE, "s"))
-        store(
-            self,
-            command_delay=check_count("command_delay", self.command_delay, 0, MAX_DELAY, "ticks"),
-        )
+        delay = check_count("command_delay", self.command_delay, 0, MAX_DELAY, "ticks")
+        store(self, command_delay=delay)
         self._check_groups()
         self._check_rates()
         self._check_plan()

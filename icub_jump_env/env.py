@@ -144,12 +144,12 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._series = SeriesRecorder(cfg.jumps, JointLimits.of(self.robot), cfg.success)
         self._recorder = self._series.present
         self._self_collision = SelfCollision(self.robot)
-        self._next_look = 0.0
         # Plans are made while the estimator uses its model, too.
         self._planner = cfg.make_planner(FeetFixedKinematics(self.robot))
         self._controller = JumpController(
-            cfg.controller_config, cfg.residual, kinematics, cfg.flight, cfg.landing
-        )
+            cfg.controller_config, cfg.residual, kinematics, cfg.lean_correction,
+            cfg.flight, cfg.landing,
+        )  # fmt: skip
         self._moves = cfg.residual.matrix
         self._of_momentum = self._moves[len(COM_AXES) :].any(axis=0)
         self._state: RobotState
@@ -327,7 +327,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._sense()
         self._start_com[:] = self._state.com
         following = self._planner.plan(more[0]) if more else None
-        self._controller.start(plan, self._state, time, following)
+        gravity = self._simulation.sensors.readings.gravity
+        self._controller.start(plan, self._state, time, gravity, following)
 
     def _look_for_overlap(self) -> None:
         data = self._simulation.physics.data

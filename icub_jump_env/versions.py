@@ -14,6 +14,7 @@ VERSIONS: Mapping[EnvName, Mapping[str, Any]] = MappingProxyType(
         "ICubJump-v1": {
             "planner": "whole_body",
             "estimator": "imu",
+            "lean_correction": True,
             "flight": "feedback",
             "landing": "feedback",
         },

@@ -113,6 +113,7 @@ ALL_DIFFERENT = JumpConfig(
     ),
     jump_height=(0.03, 0.05),
     com_displacement=0.1,
+    lean_correction=True,
     residual=ResidualConfig(scale=(0.01, 0.02, 0.03), phases="all", bandwidth=20.0),
     agent_frequency=50.0,
     timestep=0.0005,

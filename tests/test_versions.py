@@ -27,7 +27,7 @@ def test_v1_differs_in_its_defaults_alone():
         if getattr(V1, f.name) != getattr(JumpConfig(), f.name)
     }
     assert differing == {
-        "planner": "whole_body", "estimator": "imu", "flight": "feedback", "landing": "feedback",
+        "planner": "whole_body", "estimator": "imu", "lean_correction": True, "flight": "feedback", "landing": "feedback",
     }  # fmt: skip
     paper = gymnasium.make(
         "ICubJump-v1", **{name: getattr(JumpConfig(), name) for name in differing}

@@ -15,9 +15,10 @@ from icub_jump_env.control.phases import Phase, PhaseController, PhaseMachine, T
 from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.state import RobotState
+from icub_jump_env.planning.lean import lean_correction
 from icub_jump_env.planning.plan import JumpPlan
 from icub_jump_env.planning.reference import Reference
-from icub_jump_env.planning.residual import RESIDUAL_TIME, ResidualConfig, ResidualFilter
+from icub_jump_env.planning.residual import N_AXES, RESIDUAL_TIME, ResidualConfig, ResidualFilter
 from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
 Array = NDArray[np.float64]
@@ -44,6 +45,7 @@ class JumpController:
         config: VelocityConfig | TorqueConfig,
         residual: ResidualConfig,
         kinematics: FeetFixedKinematics,
+        lean_correction: bool = False,
         flight_name: FlightName = "minimum_jerk",
         landing_name: LandingName = "hold",
     ) -> None:
@@ -53,6 +55,7 @@ class JumpController:
             config: The controller of the launching phase, and when phases end.
             residual: How actions move the set point.
             kinematics: The model, which the estimator keeps up to date.
+            lean_correction: Whether to correct the launch by the lean.
             flight_name: The controller of the flight.
             landing_name: The controller of the landing.
         """
@@ -61,6 +64,8 @@ class JumpController:
         self.reference = Reference(self.residual)
         self.phases = PhaseMachine(config.phases)
         self.plan: JumpPlan
+        self._corrects_lean = lean_correction
+        self._correction = np.zeros(N_AXES)
         self._began = 0.0
         self._following: JumpPlan | None = None
         self._crouches = self._next_begins = math.inf
@@ -97,6 +102,7 @@ class JumpController:
         plan: JumpPlan,
         state: RobotState,
         time: float,
+        gravity: Array,
         following: JumpPlan | None = None,
     ) -> None:
         """Begin a jump.
@@ -105,12 +111,15 @@ class JumpController:
             plan: Its plan.
             state: The believed state.
             time: Time since the start of the episode (s).
+            gravity: (3,) its direction in the IMU frame, as it was read.
             following: The plan of the jump after it, in whose crouch it ends.
         """
         self.plan, self._following = plan, following
         self._began = time
         self._crouches = self._next_begins = math.inf
         self.phases.reset()
+        if self._corrects_lean:
+            self._correction = lean_correction(gravity, plan.stance)
         self._controllers[Phase.LAUNCH].start(state, plan, 0.0)
 
     @property
@@ -156,4 +165,6 @@ class JumpController:
         if self._following is not None and time >= self._crouches:
             self._landing.crouch(self._following, time)
             self._crouches, self._next_begins = math.inf, time + CROUCH_TIME + SETTLING
+        if phase is Phase.LAUNCH:
+            residual_target = residual_target + self._correction
         return controller.tick(state, time, residual_target)

@@ -14,6 +14,7 @@ from icub_jump_env.control.landing import HoldLanding
 from icub_jump_env.control.launch import Launch
 from icub_jump_env.control.phases import Phase
 from icub_jump_env.control.qp.problem import IDLE
+from icub_jump_env.planning.lean import gravity_in_imu, lean_correction
 from icub_jump_env.planning.reference import Reference
 from icub_jump_env.planning.residual import N_AXES, RESIDUAL_TIME, ResidualConfig, ResidualFilter
 from icub_jump_env.planning.scaled_curve import ScaledCurvePlan, plan_com_trajectory
@@ -22,6 +23,7 @@ DT = 1 / 256  # of which sums are exact
 PLAN = ScaledCurvePlan(plan_com_trajectory(0.04), ROBOT, STANCE)
 SHIFT = np.array([0.02, -0.01, 0.01, 0.3, -0.4])
 NOTHING = np.zeros(N_AXES)
+DOWN = gravity_in_imu(STANCE)
 
 
 class Recording:
@@ -135,23 +137,24 @@ CONFIGS = {
 class Jumper:
     """A controller on a robot that stands, is in the air, and stands again."""
 
-    def __init__(self, config, phases="all"):
+    def __init__(self, config, phases="all", residual=SHIFT, gravity=DOWN, lean=False):
+        self.residual, self.gravity = residual, gravity
         self.standing = Standing(0)
         self.controller = JumpController(
-            config, ResidualConfig(phases=phases), self.standing.kinematics
+            config, ResidualConfig(phases=phases), self.standing.kinematics, lean
         )
 
     def jump(self, began, plan=PLAN):
         """Commands and phases of one jump."""
         self.standing.move(0)
-        self.controller.start(plan, self.standing.state, began)
+        self.controller.start(plan, self.standing.state, began, self.gravity)
         commands, phases = [], []
         for k in range(160):
             time = k * DT
             self.standing.move(k)
             state = self.standing.state
             state.foot_force = np.full(2, 0.0 if 0.45 < time < 0.6 else 162.0)
-            tick = self.controller.tick(state, began + time, SHIFT)
+            tick = self.controller.tick(state, began + time, self.residual)
             commands += [part.copy() for part in tick.command if part is not None]
             phases.append(self.controller.phases.phase)
         return commands, phases
@@ -184,7 +187,7 @@ def test_a_second_jump_is_like_the_first(name):
 def test_when_a_residual_acts_is_told_by_the_clock_of_the_jump(phases, until):
     jumper = Jumper(VelocityConfig(), phases)
     controller, began = jumper.controller, 4.0
-    controller.start(PLAN, jumper.standing.state, began)
+    controller.start(PLAN, jumper.standing.state, began, DOWN)
     T = PLAN.duration
     for late in (0.0, T, T + RESIDUAL_TIME - 0.01, T + RESIDUAL_TIME + 0.01):
         acts = True if until is None else late < T + until
@@ -192,6 +195,18 @@ def test_when_a_residual_acts_is_told_by_the_clock_of_the_jump(phases, until):
     controller.phases.phase = Phase.FLIGHT
     assert not controller.launching
     assert controller.residual_acts(began + 0.1) is (phases == "all")
+
+
+@pytest.mark.parametrize("name", ["velocity", "torque"])
+def test_the_correction_of_the_lean_is_a_residual_of_the_launch_alone(name):
+    leaning = DOWN - [0.1, 0.05, 0.0]
+    corrected = Jumper(CONFIGS[name], "launch", NOTHING, leaning, lean=True)
+    residual = lean_correction(leaning, STANCE)
+    assert residual.tolist() == [0.0, 0.0, 0.0, 0.0, pytest.approx(6.0 * 0.1)]
+    assert not lean_correction(DOWN + [0.1, 0.05, 0.0], STANCE).any()
+    Jumper(CONFIGS[name], "launch", residual, leaning).same_jump(corrected.jump(0.0))
+    commands, _ = Jumper(CONFIGS[name], "launch", NOTHING, leaning).jump(0.0)
+    assert not all(map(np.array_equal, commands, corrected.jump(0.0)[0]))
 
 
 def test_phases_end_as_configured():

@@ -7,12 +7,11 @@ from rich.console import Console
 from experiments.headroom import (
     GRID,
     REGIMES,
+    Line,
     Shift,
     Start,
     constants,
-    follow,
     measure,
-    one,
     render,
     robust,
     starts,
@@ -38,19 +37,27 @@ def test_a_shift_begins_at_its_time():
 
 def test_hindsight_wants_two_neighbours():
     success = {key: np.zeros(4, bool) for key in constants()}
-    success["forward", 0.2][:] = True, True, True, False
-    success["forward", 0.4][:] = True, False, False, False
-    success["forward", 0.8][:] = False, True, False, False  # no neighbour of 0.2
-    success["pitch", 0.0][:] = False, False, True, False
-    success["pitch", 0.5][:] = False, False, True, False
+    success[Line("forward", 0.2)][:] = True, True, True, False
+    success[Line("forward", 0.4)][:] = True, False, False, False
+    success[Line("forward", 0.8)][:] = False, True, False, False  # no neighbour of 0.2
+    success[Line("pitch", 0.0)][:] = False, False, True, False
+    success[Line("pitch", 0.5)][:] = False, False, True, False
     assert robust(success).tolist() == [True, False, True, False]
 
 
 def test_the_law_is_a_line_within_the_range():
     start = Start((0.05, -0.5), 0.1)
-    assert follow(("forward", 0.2, -2.0), start).action == pytest.approx(one("forward", 0.1))
-    assert follow(("pitch", 0.2, -2.0), start).action == pytest.approx(one("pitch", 0.1))
-    assert follow(("lateral", 0.0, 3.0), start).action == one("lateral", -1.0)
+    for axis in ("forward", "pitch"):
+        action = dict(zip(AXES, Line(axis, 0.2, -2.0).policy(start).action, strict=True))
+        assert action.pop(axis) == pytest.approx(0.1)
+        assert not any(action.values())
+    assert Line("lateral", 0.0, 3.0).policy(start).action[AXES.index("lateral")] == -1.0
+
+
+def test_it_can_begin_with_the_push():
+    start = Start((0.05, 0.0), 0.25)
+    assert Line("pitch", 0.5).policy(start).start == 0.0
+    assert Line("pitch", 0.5, after_push=True).policy(start).start == 0.25
 
 
 def test_zero_is_in_the_grid_of_each_axis():

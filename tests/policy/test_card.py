@@ -181,6 +181,7 @@ OTHERS = {
     "controller": "torque",
     "planner": "whole_body",
     "estimator": "imu",
+    "lean_correction": True,
     "flight": "feedback",
     "landing": "feedback",
     "com_displacement": 0.1,
