@@ -45,7 +45,7 @@ COMMAND_BLOCKS = (
 TASK = JumpConfig(jump_height=(0.04, 0.08), com_displacement=0.09, randomization="hard")
 """A short launch jumps higher than the paper's 11 cm, and lands less often."""
 
-SELECTION = range(10_000, 10_064)
+SELECTION = range(10_000, 10_200)
 """Seeds of the evaluations of a training, which choose its best policy. Its own episodes draw
 theirs from 32 bits, which leaves these out but for a chance of one in a hundred thousand."""
 
@@ -139,6 +139,7 @@ class TrainOptions:
         jobs: Environments side by side, each in a process; the result depends on it.
         checkpoint_every: Updates between two checkpoints; with each the policy is
             evaluated.
+        evaluation_episodes: Episodes of each evaluation, which choose the best policy.
         run: Folder of the run; by default one in runs/, named by controller and seed.
         resume: Finish the interrupted run in this folder.
         config: Take what is not said here from this file, such as a run's options.json.
@@ -158,7 +159,8 @@ class TrainOptions:
     seeds: str | None = None
     cluster: str | None = None
     jobs: int = 8
-    checkpoint_every: int = 4
+    checkpoint_every: int = 16
+    evaluation_episodes: int = len(SELECTION)
     run: Path | None = None
     resume: Path | None = None
     config: Path | None = None
@@ -173,6 +175,7 @@ class TrainOptions:
         check_count("timesteps", self.timesteps, 1, 1_000_000_000, "steps")
         check_count("seed", self.seed, 0, LARGEST_SEED)
         check_count("jobs", self.jobs, 1, 1000, "processes")
+        check_count("evaluation_episodes", self.evaluation_episodes, 1, len(SELECTION))
         check_count("checkpoint_every", self.checkpoint_every, 1, unit="updates")
         if self.env.rendering.mode is not None:
             raise ConfigError("render_mode", self.env.rendering.mode, "not in a training")

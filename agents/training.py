@@ -348,7 +348,8 @@ class _Run(BaseCallback):
 
     def _evaluate(self) -> None:
         policy = export(self.model, self._options, self._action_scale)
-        episodes = self._env.evaluate(policy, SELECTION)
+        seeds = SELECTION[: self._options.evaluation_episodes]
+        episodes = self._env.evaluate(policy, seeds)
         self._curve.append(curve_point(self.model.num_timesteps, episodes))
         now = time.monotonic()
         self._minutes.append(round((now - self._since) / 60, 3))
@@ -370,7 +371,7 @@ class _Run(BaseCallback):
                 "minutes": self._minutes,
                 "seed": self._options.seed,
                 "episode_seeds": self._seeds,
-                "evaluation_seeds": [SELECTION.start, SELECTION.stop],
+                "evaluation_seeds": [seeds.start, seeds.stop],
             },
         )
         say(

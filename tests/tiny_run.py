@@ -4,7 +4,7 @@ import json
 
 import psutil
 
-from agents import cli, training
+from agents import cli
 from agents.options import PPOOptions, TrainOptions
 from icub_jump_env.config import JumpConfig
 
@@ -16,7 +16,7 @@ PPO = PPOOptions(episodes=2, batch_size=16, epochs=1, hidden=(8,))
 ARGUMENTS = (
     *("--stand-time", "0.1", "--jobs", "2", "--timesteps", "200", "--checkpoint-every", "1"),
     *("--ppo.episodes", "2", "--ppo.batch-size", "16", "--ppo.epochs", "1", "--ppo.hidden", "8"),
-    *("--ppo.log-std", "-1.0", "-1.2", "--ppo.ramp", "1"),
+    *("--ppo.log-std", "-1.0", "-1.2", "--ppo.ramp", "1", "--evaluation-episodes", "2"),
 )
 """Three updates of two episodes, four checkpoints; the policy changes from the second on."""
 
@@ -37,13 +37,13 @@ UNUSUAL = TrainOptions(
     seed=2**32 - 1,
     jobs=3,
     checkpoint_every=2,
+    evaluation_episodes=5,
 )
 """Nothing as by default."""
 
 
 def train(patch, *arguments):
-    """Exit code of train.py with these arguments, but few episodes in an evaluation."""
-    patch.setattr(training, "SELECTION", SEEDS)
+    """Exit code of train.py with these arguments."""
     patch.setattr("sys.argv", ["train.py", *arguments])
     try:
         cli.run([*arguments])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from local_cluster import two_nodes
-from tiny_run import ARGUMENTS, SEEDS, results, train
+from tiny_run import ARGUMENTS, results, train
 
 from agents import several, training
 from agents.options import TrainOptions, read_options
@@ -87,10 +87,6 @@ def test_one_after_the_other_and_on_with_the_interrupted(alone, monkeypatch, cap
 
 
 class TestOnANode:
-    @pytest.fixture(autouse=True)
-    def few_episodes(self, monkeypatch):
-        monkeypatch.setattr(training, "SELECTION", SEEDS)
-
     def snapshots(self, folder):
         run = dataclasses.replace(read_options(folder / "options.json"), resume=folder)
         asked = pickle.dumps((run, several._files(folder)))
@@ -143,11 +139,9 @@ def curve(folder):
 
 
 def test_a_node_lost_midway_changes_nothing(monkeypatch, capsys):
-    """Nodes evaluate with all seeds, and so must the runs here."""
     pytest.importorskip("ray")
     short = ["--seeds", "0..1", "--stand-time", "0.0", "--jobs", "2", "--timesteps", "1"]
-    short += ["--ppo.episodes", "2", "--ppo.hidden", "8"]
-    monkeypatch.setattr("tiny_run.SEEDS", training.SELECTION)
+    short += ["--ppo.episodes", "2", "--ppo.hidden", "8", "--evaluation-episodes", "2"]
     assert train(monkeypatch, *short, "--run", "here") == 0
     with two_nodes() as (address, kill_second):
         write, written = several._write, []

@@ -145,7 +145,7 @@ def test_a_run_that_goes_on_with_other_code_says_so(finished, monkeypatch, capsy
 
 def test_a_killed_run_ends_as_if_it_had_not_been(whole, monkeypatch):
     """Where it hurts most: evaluated and written, but not yet in a checkpoint."""
-    program = f"""
+    program = """
 import os, signal, sys
 
 from agents import training
@@ -157,7 +157,6 @@ def save_or_die(folder, model, number, progress):
     save(folder, model, number, progress)
 
 save, training.save_checkpoint = training.save_checkpoint, save_or_die
-training.SELECTION = {SEEDS!r}
 sys.argv[0] = "train.py"
 run(sys.argv[1:])
 """
