@@ -37,8 +37,8 @@ class Series:
         terminated = False
         begin = env._controller.start
 
-        def start(plan, state, time, following=None):
-            begin(plan, state, time, following)
+        def start(plan, state, time, gravity, following=None):
+            begin(plan, state, time, gravity, following)
             self.starts.append(time)
             self.speed = float(np.linalg.norm(state.com_velocity))
             self.sway = float(np.linalg.norm(state.angular_momentum))
