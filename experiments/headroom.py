@@ -32,7 +32,7 @@ from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
 from icub_jump_env.evaluation.episodes.rollout import make_env
-from icub_jump_env.evaluation.quantities import CONTROLLERS, seeds
+from icub_jump_env.evaluation.quantities import CONTROLLERS, PERCENT, seeds
 from icub_jump_env.evaluation.report.output import new_table, show
 from icub_jump_env.observation import DEFAULT
 from icub_jump_env.planning.lean import lean_of
@@ -297,7 +297,7 @@ def render(
     for (regime, controller), found in results.items():
         constant, law = found["chosen constant"], found["chosen law"]
         percent = {
-            name: f"{100 * np.mean(values):.0f}"
+            name: f"{PERCENT * np.mean(values):.0f}"
             for name, values in found.items()
             if not name.startswith("chosen")
         }

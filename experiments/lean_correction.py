@@ -2,7 +2,8 @@
 
     python -m experiments.lean_correction --jobs 2
 
-First several momenta of the launch per lean are tried in ``disturbed`` worlds. Then each regime of :mod:`experiments.headroom` is jumped without and with what was chosen.
+First several momenta of the launch per lean are tried in ``disturbed`` worlds. Then each regime of
+:mod:`experiments.headroom` is jumped without and with what was chosen.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from experiments.seeds import TUNING
 from icub_jump_env.checks import check_choice, check_count
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
-from icub_jump_env.evaluation.quantities import CONTROLLERS, seeds
+from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT, seeds
 from icub_jump_env.evaluation.report.output import new_table, show
 from icub_jump_env.planning.residual import AXES, ResidualConfig
 from icub_jump_env.versions import VERSIONS, EnvName
@@ -68,7 +69,7 @@ def tune(options: LeanOptions, progress: Console) -> Table:
         ]
         played = [episode.is_success for episode in run_all(work, options.jobs, progress)]
         success = np.mean(np.reshape(played, (len(GAINS), -1)), axis=1)
-        table.add_row(controller, *(f"{100 * share:.0f}" for share in success))
+        table.add_row(controller, *(f"{PERCENT * share:.0f}" for share in success))
     return table
 
 
@@ -87,9 +88,9 @@ def compare(options: LeanOptions, progress: Console) -> Table:
             played = run_all([Job(config, seed) for seed in on], options.jobs, progress)
             cells.append(
                 (
-                    f"{100 * np.mean([episode.is_success for episode in played]):.0f}",
+                    f"{PERCENT * np.mean([episode.is_success for episode in played]):.0f}",
                     *(
-                        f"{100 * np.nanmedian([episode.jump[name] for episode in played]):.2f}"
+                        f"{CM * np.nanmedian([episode.jump[name] for episode in played]):.2f}"
                         for name in ("flight_height", "sole_height")
                     ),
                 )

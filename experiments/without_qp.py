@@ -1,9 +1,9 @@
-"""PPO without the QP: joint targets as actions, at the budget of a residual, as the other end of the scale.
+"""PPO without the QP, as the other end of the scale: joint targets as actions, the same budget.
 
     python -m experiments.without_qp --jobs 2
 
-In the launch the policy moves the targets of the joint servos around the crouch, both legs and arms alike.
-Task, plan of the flight, landing, observation, reward and PPO are those of ``train.py``.
+In the launch the policy moves the targets of the joint servos around the crouch, both legs and arms
+alike. Task, flight, landing, observation, reward and PPO are those of a residual.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 from rich.console import Console
 from stable_baselines3 import PPO
@@ -37,7 +38,6 @@ from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT
 from icub_jump_env.evaluation.report.output import say
 from icub_jump_env.planning.plan import JumpPlan
-from icub_jump_env.planning.residual import AXES
 from icub_jump_env.robot.icub import posture
 
 Array = NDArray[np.float64]
@@ -76,8 +76,9 @@ class JointEnv(LaunchEnv):
     """The launch, whose actions are targets of the joints, from -1 to 1 around the crouch."""
 
     def __init__(self, config: JumpConfig, inputs: Sequence[str]) -> None:
-        # As many actions as there are joints to move.
-        super().__init__(config.replace(residual_axes=AXES), inputs, AXES)
+        super().__init__(config, inputs, config.residual.axes)
+        self._no_residual = np.zeros(self.action_space.shape or (), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (len(JOINTS),), np.float32)
         env = self.env
         controllers = env._controller._controllers
         self._launch = JointLaunch(
@@ -94,7 +95,7 @@ class JointEnv(LaunchEnv):
         target = robot.crouch + self._moves @ (LARGEST * np.clip(action, -1.0, 1.0))
         within = np.clip(target, robot.lower_position, robot.upper_position)
         self._launch.go_to(within, robot.velocity_limit)
-        return super().step(np.zeros_like(action))
+        return super().step(self._no_residual)
 
 
 @dataclass(frozen=True)
@@ -157,9 +158,7 @@ def run(options: WithoutOptions) -> None:
     console = Console()
     for controller, seed in itertools.product(CONTROLLERS, range(options.seeds)):
         env = configuration("ICubJump-v1", "disturbed", controller, lean_correction=False)
-        training = TrainOptions(
-            env=env, axes=AXES, jobs=options.jobs, timesteps=options.timesteps, seed=seed
-        )
+        training = TrainOptions(env=env, jobs=options.jobs, timesteps=options.timesteps, seed=seed)
         infos = learn(training)
         success = np.mean([info["is_success"] for info in infos])
         rise = np.median([info["jump"]["flight_height"] for info in infos])

@@ -165,6 +165,6 @@ class JumpController:
         if self._following is not None and time >= self._crouches:
             self._landing.crouch(self._following, time)
             self._crouches, self._next_begins = math.inf, time + CROUCH_TIME + SETTLING
-        if phase is Phase.LAUNCH:
+        if self._corrects_lean and phase is Phase.LAUNCH:
             residual_target = residual_target + self._correction
         return controller.tick(state, time, residual_target)

@@ -10,9 +10,8 @@ from agents.options import TrainOptions
 from experiments.without_qp import JOINTS, JointEnv, WithoutOptions, learn
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
-from icub_jump_env.planning.residual import AXES
 
-CONFIG = JumpConfig.of(residual_axes=AXES, stand_time=0.1)
+CONFIG = JumpConfig.of(stand_time=0.1)
 
 
 @pytest.fixture
@@ -47,7 +46,7 @@ def test_a_joint_moves_on_both_sides_and_no_faster_than_it_may(env):
 
 def test_it_learns_and_plays(monkeypatch):
     monkeypatch.setattr("experiments.without_qp.SELECTION", range(2))
-    options = TrainOptions(env=CONFIG, axes=AXES, ppo=PPO, jobs=1, timesteps=10)
+    options = TrainOptions(env=CONFIG, ppo=PPO, jobs=1, timesteps=10)
     for info in learn(options):
         assert info["outcome"] in ("stood", "fell", "no take-off")
 
