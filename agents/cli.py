@@ -27,8 +27,13 @@ def run(arguments: Sequence[str]) -> None:
     guarded(lambda: _run(arguments))
 
 
+def asked(arguments: Sequence[str]) -> TrainOptions:
+    """What the arguments of train.py ask for."""
+    return parse(TrainOptions, arguments, _default(arguments))
+
+
 def _run(arguments: Sequence[str]) -> None:
-    options = parse(TrainOptions, arguments, _default(arguments))
+    options = asked(arguments)
     try:
         from .training import train
     except ImportError as error:

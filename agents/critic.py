@@ -24,6 +24,7 @@ class PrivilegedExtractor(MlpExtractor):
         super().__init__(n_inputs, *arguments, **others)
         actor = MlpExtractor(n_actor, *arguments, **others)
         self.policy_net, self._n_actor = actor.policy_net, n_actor
+        self.latent_dim_pi = actor.latent_dim_pi
 
     def forward_actor(self, features: Tensor) -> Tensor:
         """Of the actor's inputs."""

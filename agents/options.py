@@ -29,7 +29,7 @@ from icub_jump_env.policy.fields import (
 )
 from icub_jump_env.shortcuts import Shortcuts
 
-Inputs = Literal["all", "command"]
+Inputs = Literal["all", "balance", "command"]
 Critic = Literal["observation", "world"]
 
 COMMAND_BLOCKS = (
@@ -41,6 +41,9 @@ COMMAND_BLOCKS = (
     "takeoff_time",
 )
 """What is known before the jump: an agent that sees no more replays a plan."""
+
+JOINT_BLOCKS = "joint_position", "joint_velocity"
+"""Half of the observation, which an agent that balances can do without."""
 
 TASK = JumpConfig(jump_height=(0.04, 0.08), com_displacement=0.09, randomization="hard")
 """A short launch jumps higher than the paper's 11 cm, and lands less often."""
@@ -74,24 +77,27 @@ class PPOOptions:
         gae_lambda: Trade of bias for variance in the advantages.
         clip_range: How far an update may change the probability of an action.
         target_kl: An update ends early beyond 1.5 times this divergence.
-        hidden: Widths of the hidden layers, of policy and value function alike.
-        log_std: Logarithm of the exploration noise, at the beginning and at the end.
+        hidden: Widths of the policy's hidden layers; with none it is a linear feedback.
+        critic_hidden: Those of the value function.
+        log_std: Logarithm of the exploration noise, at the beginning and at the end: of what an
+            episode adds to its actions throughout.
         warmup: Updates at the beginning that teach the value function alone.
         action_scale: Largest action of the policy.
         ramp: Updates during which the actions grow to their scale.
     """
 
-    episodes: int = 64
-    batch_size: int = 256
+    episodes: int = 128
+    batch_size: int = 1024
     epochs: int = 10
     learning_rate: float = 5e-4
     gamma: float = 0.999
     gae_lambda: float = 0.98
     clip_range: float = 0.2
-    target_kl: float = 0.04
+    target_kl: float = 0.03
     hidden: tuple[int, ...] = (64, 64)
-    log_std: tuple[float, float] = (-1.0, -2.3)
-    warmup: int = 1
+    critic_hidden: tuple[int, ...] = (64, 64)
+    log_std: tuple[float, float] = (-1.7, -2.5)
+    warmup: int = 2
     action_scale: float = 1.0
     ramp: int = 0
 
@@ -114,6 +120,7 @@ class PPOOptions:
         ):
             store(self, **{name: check_number(name, getattr(self, name), low, high, unit)})
         store(self, hidden=check_hidden(self.hidden))
+        store(self, critic_hidden=check_hidden(self.critic_hidden))
         store(self, log_std=check_numbers("log_std", self.log_std, 2, -10.0, 2.0))
 
 
@@ -125,12 +132,13 @@ class TrainOptions:
         env: The jump; every field of the environment's configuration is a flag.
         shortcuts: Fields inside its groups; they end up there.
         ppo: How PPO learns.
-        inputs: What the policy sees: the whole observation, or command and time alone.
+        inputs: What the policy sees: the whole observation, all but the joints, or command and
+            time alone.
         axes: Axes of the action that it uses; by default forward and vertical, as far as the action
             has them, else all that it has.
         critic: What the value function sees in training: the same, or the world and the true state,
             too.
-        timesteps: Steps of the launch to learn from; an episode has about 35.
+        timesteps: Steps of the launch to learn from; an episode has 30 to 50.
         seed: Seed of everything random.
         seeds: Train with each of these seeds instead, such as 0..4, each in a folder of its own.
             The same command goes on with what was interrupted.
@@ -159,7 +167,7 @@ class TrainOptions:
     seeds: str | None = None
     cluster: str | None = None
     jobs: int = 8
-    checkpoint_every: int = 16
+    checkpoint_every: int = 8
     evaluation_episodes: int = len(SELECTION)
     run: Path | None = None
     resume: Path | None = None
@@ -226,9 +234,14 @@ class TrainOptions:
         """Entries of the observation that the policy sees."""
         layout = self.env.layout
         names = tuple(layout.scales)
-        if self.inputs == "all":
-            return names
-        return tuple(name for block in COMMAND_BLOCKS for name in names[layout.slices[block]])
+        match self.inputs:
+            case "all":
+                seen = list(layout.slices)
+            case "balance":
+                seen = [block for block in layout.slices if block not in JOINT_BLOCKS]
+            case "command":
+                seen = list(COMMAND_BLOCKS)
+        return tuple(name for block in seen for name in names[layout.slices[block]])
 
     def as_dict(self) -> dict[str, Any]:
         """What the result depends on, for JSON."""

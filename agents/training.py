@@ -46,7 +46,7 @@ from .checkpoints import (
 from .curve import check_progress, curve_point, read_minutes
 from .environment import LaunchEnv, acting_steps
 from .options import COMMAND, OPTIONS, SELECTION, TrainOptions, read_options
-from .ppo import export, freeze_policy, make_model, set_noise
+from .ppo import export, freeze_policy, make_model, set_noise, whiten
 from .run_folder import lock_run
 from .vec_env import JumpVecEnv
 
@@ -288,9 +288,11 @@ class _Run(BaseCallback):
             self._resumed = False
             self._begin_segment()
         elif self._updates % self._options.checkpoint_every == 0:
+            if self._updates == 0:
+                whiten(self.model, self._options)
             self._checkpoint()
             self._begin_segment()
-        set_noise(self.model, self._options)
+        self.logger.record("rollout/noise", set_noise(self.model, self._options))
         freeze_policy(self.model, self._updates < self._options.ppo.warmup)
         self._env.env_method("scale_actions", self._action_scale)
 

@@ -28,6 +28,7 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
+from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.series import Series
 from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT, seeds
 from icub_jump_env.evaluation.report.output import new_table, show
@@ -103,9 +104,14 @@ def _jumps(
 ) -> Array:
     """Success (%), rise and height of the soles (cm) of each episode (3, n)."""
     series = Series(config, TEST[: options.episodes], contender)
+    return jumps_of(series.complete(options.jobs, progress))
+
+
+def jumps_of(episodes: Sequence[Episode]) -> Array:
+    """Success (%), rise and height of the soles (cm) of each episode (3, n)."""
     found = [
         (PERCENT * e.is_success, CM * e.jump["flight_height"], CM * e.jump["sole_height"])
-        for e in series.complete(options.jobs, progress)
+        for e in episodes
     ]
     jumps: Array = np.nan_to_num(found).T  # without a flight: no height
     return jumps
@@ -142,13 +148,14 @@ def _add(
     )
 
 
-def runs_interval(gains: Array) -> tuple[float, float]:
-    """Interval of 95 % of the interquartile mean over training seeds, the same at each call.
+def runs_interval(gains: Array, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Interval of the interquartile mean over training seeds, the same at each call.
 
     A percentile bootstrap that draws both training seeds and episodes anew.
 
     Args:
         gains: Of each training in each episode (seeds, n).
+        confidence: Of the interval.
     """
     rng = np.random.default_rng(0)
     runs, episodes = gains.shape
@@ -158,7 +165,7 @@ def runs_interval(gains: Array) -> tuple[float, float]:
         )
         for _ in range(_RESAMPLES)
     ]
-    tail = 50.0 * (1.0 - CONFIDENCE)
+    tail = 50.0 * (1.0 - confidence)
     low, high = np.percentile(interquartile_mean(means, axis=1), [tail, 100.0 - tail])
     return float(low), float(high)
 

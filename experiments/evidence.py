@@ -8,33 +8,34 @@ fills experiments/runs/ and icub_jump_env/policy/shipped/, draws the learning cu
 
 from __future__ import annotations
 
+import itertools
 import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
-from agents.options import OPTIONS, TrainOptions, read_options
+from agents.cli import asked
+from agents.options import OPTIONS, read_options
 from agents.training import BEST, CURVE, LAST, other_code
 from experiments.figures import learning_curves
 from experiments.rivals import best_constant, open_loop
-from experiments.seeds import TEST
-from experiments.shipped import CURVE_SUFFIX, REPOSITORY, RUNS
+from experiments.seeds import FELT_TEST, TEST
+from experiments.shipped import CURVE_SUFFIX, REPOSITORY, RUNS, best_of, selection_of
 from icub_jump_env.checks import check_count
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.cli import guarded, parse
-from icub_jump_env.evaluation.episodes.contender import Contender, read_contenders
+from icub_jump_env.evaluation.episodes.contender import read_contenders
 from icub_jump_env.evaluation.episodes.series import Series
 from icub_jump_env.evaluation.quantities import CONTROLLERS
 from icub_jump_env.evaluation.report.output import say
 from icub_jump_env.evaluation.report.provenance import SOURCE, source, versions
 from icub_jump_env.evaluation.statistics.summary import Summary
+from icub_jump_env.planning.residual import AXES
 from icub_jump_env.policy import NetworkPolicy, ReplayPolicy, load_policy, save_policy
 from icub_jump_env.policy.saving import SHIPPED, LoadedPolicy
 
@@ -42,20 +43,30 @@ EVIDENCE = Path("runs/evidence")
 """Where the runs are, in it."""
 
 HEADLINE_SEEDS = range(5)
-ABLATION_SEEDS = range(1)
+ABLATION_SEEDS = range(3)
+
+DISTURBED = ("--config", "agents/hyperparameters/disturbed.json")
+"""Arguments of train.py for the task in which a policy wins by what it feels."""
+
+NETWORK = (
+    *("--ppo.hidden", "32", "32", "--ppo.learning-rate", "5e-4"),
+    *("--ppo.log-std", "-1.7", "-2.5"),
+)
+"""Those of a policy that is no linear feedback."""
+
+PLAN = ("--inputs", "command", *NETWORK, "--no-lean-correction")
+"""Those of one that sees command and time alone, and corrects no lean."""
 
 ABLATIONS = {
-    "forward": ("--axes", "forward"),
-    "vertical": ("--axes", "vertical"),
-    "all-axes": ("--axes", "forward", "lateral", "vertical"),
-    "nominal": ("--randomization", "none"),
-    # Its episodes have three times as many steps.
-    "all-phases": ("--residual-phases", "all", "--timesteps", "300000"),
+    "unfelt": ("--inputs", "command", *NETWORK),
+    "history": ("--observation.history", "4"),
+    "same-critic": ("--critic", "observation"),
+    "all-axes": ("--residual.axes", *AXES, "--axes", *AXES),
+    "fast-filter": ("--residual.bandwidth", "40"),
+    "without-law": ("--no-lean-correction",),
+    "network": NETWORK,
 }
-"""Arguments of train.py that make each ablation, of the velocity controller."""
-
-PLAN = ("--inputs", "command")
-"""Those of a policy that sees command and time alone."""
+"""Those that make each ablation there, of the velocity controller."""
 
 
 class EvidenceError(ICubJumpError, RuntimeError):
@@ -68,10 +79,12 @@ class EvidenceOptions:
 
     Attributes:
         jobs: Processes that evaluate in parallel.
+        train: Train, and not only make the rest of the policies in experiments/runs.
         train_only: Train, and leave shipped policies and documents as they are.
     """
 
     jobs: int = 1
+    train: bool = True
     train_only: bool = False
 
     def __post_init__(self) -> None:
@@ -81,15 +94,17 @@ class EvidenceOptions:
 def trainings() -> dict[str, tuple[str, ...]]:
     """Arguments of train.py for every training, by the name of its policy."""
     named: dict[str, tuple[str, ...]] = {}
-    for seed in HEADLINE_SEEDS:
-        for controller in CONTROLLERS:
-            named[f"{controller}-seed{seed}"] = ("--controller", controller, "--seed", str(seed))
-    for seed in ABLATION_SEEDS:
-        for controller in CONTROLLERS:
-            words = ("--controller", controller, *PLAN, "--seed", str(seed))
-            named[f"{controller}-plan-seed{seed}"] = words
-        for name, arguments in ABLATIONS.items():
-            named[f"velocity-{name}-seed{seed}"] = (*arguments, "--seed", str(seed))
+    for controller, seed in itertools.product(CONTROLLERS, HEADLINE_SEEDS):
+        own = ("--controller", controller, "--seed", str(seed))
+        named[f"{controller}-seed{seed}"] = own
+        named[f"disturbed-{controller}-seed{seed}"] = (*DISTURBED, *own)
+    for controller, seed in itertools.product(CONTROLLERS, ABLATION_SEEDS):
+        own = ("--controller", controller, "--seed", str(seed))
+        named[f"disturbed-{controller}-plan-seed{seed}"] = (*DISTURBED, *own, *PLAN)
+    for (name, arguments), seed in itertools.product(ABLATIONS.items(), ABLATION_SEEDS):
+        named[f"disturbed-velocity-{name}-seed{seed}"] = (
+            *DISTURBED, "--seed", str(seed), *arguments,
+        )  # fmt: skip
     return named
 
 
@@ -102,8 +117,9 @@ def remake(options: EvidenceOptions) -> None:
     """
     console = Console(stderr=True)
     for name, arguments in trainings().items():
-        say(console, f"run {name}")
-        _train(name, arguments)
+        if options.train:
+            say(console, f"run {name}")
+            _train(name, arguments)
     for file in RUNS.glob("*-seed*.*"):
         if file.name.split(".")[0] not in trainings():
             say(console, f"removing {file}, which is no longer trained")
@@ -111,8 +127,9 @@ def remake(options: EvidenceOptions) -> None:
     if options.train_only:
         return
     for controller in CONTROLLERS:
-        shipped = _ship(controller, options.jobs, console)
+        shipped = _ship(controller, TEST, options.jobs, console)
         _make_rivals(controller, shipped, options.jobs, console)
+        _ship(f"disturbed-{controller}", FELT_TEST, options.jobs, console)
     learning_curves(RUNS).savefig(REPOSITORY / "docs" / "images" / "learning.png")
     _run("docs/update.py")
 
@@ -122,7 +139,7 @@ def _train(name: str, arguments: tuple[str, ...]) -> None:
     words = (*arguments, "--run", str(EVIDENCE / name))
     folder = REPOSITORY / EVIDENCE / name
     if (folder / OPTIONS).exists():
-        if read_options(folder / OPTIONS).as_dict() != parse(TrainOptions, arguments).as_dict():
+        if read_options(folder / OPTIONS).as_dict() != asked(arguments).as_dict():
             raise EvidenceError(f"{EVIDENCE / name} holds a run with other options: remove it")
         _check_code(folder, LAST)
         words = ("--resume", str(EVIDENCE / name))
@@ -147,21 +164,21 @@ def _run(*words: str) -> None:
         raise EvidenceError(f"failed: python {shlex.join(words)}") from error
 
 
-def _ship(controller: ControllerName, jobs: int, console: Console) -> LoadedPolicy:
-    """The best of the headline runs; its card says how it does on held-out seeds."""
-    names = [f"{controller}-seed{seed}.safetensors" for seed in HEADLINE_SEEDS]
+def _ship(name: str, seeds: range, jobs: int, console: Console) -> LoadedPolicy:
+    """The best of some headline runs; its card says how it does on held-out seeds."""
+    names = [f"{name}-seed{seed}.safetensors" for seed in HEADLINE_SEEDS]
     contenders = read_contenders([str(RUNS / name) for name in names])
-    best = max(contenders, key=lambda contender: _selection(contender)["score"])
+    best = best_of(contenders)
     assert isinstance(best.policy, LoadedPolicy)  # it was read from a file
     card = best.policy.card
-    summary = Summary.of(Series(card.config, TEST, best).complete(jobs, console))
+    summary = Summary.of(Series(card.config, seeds, best).complete(jobs, console))
     test = {
-        "seeds": [TEST.start, TEST.stop],
+        "seeds": [seeds.start, seeds.stop],
         "success": summary.success.as_dict(),
         "landed": summary.landed.as_dict(),
         "mean_rise": summary.mean_rise,
     }
-    path = SHIPPED / f"{controller}.safetensors"
+    path = SHIPPED / f"{name}.safetensors"
     save_policy(
         path,
         best.policy.policy,
@@ -169,16 +186,9 @@ def _ship(controller: ControllerName, jobs: int, console: Console) -> LoadedPoli
         versions=card.versions,
         command=card.command,
         seed=card.seed,
-        results={"selection": _selection(best), "test": test},
+        results={"selection": selection_of(best), "test": test},
     )
     return load_policy(path)
-
-
-def _selection(contender: Contender) -> Mapping[str, Any]:
-    """The evaluation that made this policy the best of its run."""
-    assert contender.card is not None  # it was read from a file
-    evaluation: Mapping[str, Any] = contender.card.results["evaluation"]
-    return evaluation
 
 
 def _make_rivals(

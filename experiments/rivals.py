@@ -16,21 +16,32 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.report.output import progress_display
+from icub_jump_env.observation import Layout
+from icub_jump_env.planning.residual import COM_AXES, AxisName
 from icub_jump_env.policy import NetworkPolicy, Policy, ReplayPolicy
 
 FORWARD = tuple(np.round(np.arange(0.0, 0.81, 0.1), 3))
 VERTICAL = (-1.0, -0.5, 0.0, 0.5)
 """Constant actions that are tried."""
 
+WITH_MOMENTUM = ((-0.2, 0.0, 0.2, 0.4), (-0.5, 0.0, 0.5), (-0.5, 0.0, 0.5))
+"""Forward, vertical and pitch where there is the last, fewer of each."""
+
 _COMMANDS = 9
 """Commands at which the mean action is taken, evenly over the range."""
 
 
-def constant_shift(forward: float, vertical: float) -> NetworkPolicy:
-    """The policy whose action is always the same."""
-    bias = np.array([forward, vertical], np.float32)
-    layer = np.zeros((2, 0), np.float32), bias
-    return NetworkPolicy((), (layer,), ("forward", "vertical"))
+def constant_shift(forward: float, vertical: float, pitch: float | None = None) -> NetworkPolicy:
+    """The policy whose action is always the same; with pitch, on those three axes alone."""
+    axes: tuple[AxisName, ...] = ("forward", "vertical")
+    values, all_axes = [forward, vertical], COM_AXES
+    if pitch is not None:
+        axes = all_axes = (*axes, "pitch")
+        values.append(pitch)
+    bias = np.array(values, np.float32)
+    layer = np.zeros((len(bias), 0), np.float32), bias
+    entries = tuple(Layout(axes=all_axes).scales)
+    return NetworkPolicy((), (layer,), axes, action_axes=all_axes, entries=entries)
 
 
 def best_constant(
@@ -44,7 +55,8 @@ def best_constant(
         console: Where the progress is shown.
         seeds: Episodes of each shift.
     """
-    shifts = [constant_shift(*shift) for shift in itertools.product(FORWARD, VERTICAL)]
+    grid = WITH_MOMENTUM if "pitch" in config.residual.axes else (FORWARD, VERTICAL)
+    shifts = [constant_shift(*shift) for shift in itertools.product(*grid)]
     work = [Job(config, seed, shift) for shift in shifts for seed in seeds]
     rewards = [episode.reward for episode in run_all(work, jobs, console)]
     scores = np.reshape(rewards, (len(shifts), -1)).mean(axis=1)
@@ -63,7 +75,8 @@ def open_loop(
         seeds: Episodes whose actions are averaged, dealt out to the commands.
     """
     commands = np.unique(np.linspace(*config.jump_heights, _COMMANDS))  # or there is only one
-    sums = np.zeros((len(commands), acting_steps(config), 3))
+    axes = config.residual.axes
+    sums = np.zeros((len(commands), acting_steps(config), len(axes)))
     counts = np.zeros((*sums.shape[:2], 1))
     with progress_display(console) as display:
         task = display.add_task("averaging", total=len(seeds))
@@ -81,7 +94,7 @@ def open_loop(
             env.close()
     means = sums / np.maximum(counts, 1)
     return ReplayPolicy(
-        commands.astype(np.float32), means.astype(np.float32), config.agent_frequency
+        commands.astype(np.float32), means.astype(np.float32), config.agent_frequency, axes
     )
 
 

@@ -6,7 +6,16 @@ from types import MappingProxyType
 from agents.options import SELECTION
 from icub_jump_env.control.config import ControllerName
 
-__all__ = ["FORESIGHT_TEST", "LANDING_TEST", "PLANNER_TEST", "SELECTION", "TEST", "TUNING"]
+__all__ = [
+    "FELT_TEST",
+    "FELT_TUNING",
+    "FORESIGHT_TEST",
+    "LANDING_TEST",
+    "PLANNER_TEST",
+    "SELECTION",
+    "TEST",
+    "TUNING",
+]
 
 TUNING = range(200)
 """Tuned the controllers; choose constants, mean actions and the strongest baselines."""
@@ -18,6 +27,12 @@ Seeds 2000 to 2499 were the test seeds before. Their results had been seen when 
 :mod:`experiments.frontier` was changed, so they are held out no longer; the results in the cards
 of the shipped policies, which were chosen earlier, are of those seeds.
 """
+
+FELT_TEST = range(7000, 7500)
+"""Held out from everything that chose the policies of ``disturbed`` worlds, and what they meet."""
+
+FELT_TUNING = range(11_000, 11_400)
+"""Chose how the policies of ``disturbed`` worlds learn."""
 
 PLANNER_TEST = range(5000, 5200)
 """Held out from everything that chose whole-body plans."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from agents.options import TASK
 from icub_jump_env.config import JumpConfig
@@ -21,3 +23,15 @@ def judged_config(contender: Contender) -> JumpConfig:
     """The task's commands and worlds, with what a policy depends on as in its training."""
     assert contender.card is not None  # it was read from a file
     return as_trained(contender.card, TASK)
+
+
+def selection_of(contender: Contender) -> Mapping[str, Any]:
+    """The evaluation that made this policy the best of its run."""
+    assert contender.card is not None  # it was read from a file
+    evaluation: Mapping[str, Any] = contender.card.results["evaluation"]
+    return evaluation
+
+
+def best_of(contenders: Sequence[Contender]) -> Contender:
+    """That with the largest mean reward in the evaluation that chose it."""
+    return max(contenders, key=lambda contender: selection_of(contender)["score"])

@@ -11,12 +11,13 @@ from icub_jump_env.config import JumpConfig
 SEEDS = range(10_000, 10_002)
 """Of the evaluations."""
 
-PPO = PPOOptions(episodes=2, batch_size=16, epochs=1, hidden=(8,))
+PPO = PPOOptions(episodes=2, batch_size=16, epochs=1, hidden=(8,), critic_hidden=(8,))
 
 ARGUMENTS = (
     *("--stand-time", "0.1", "--jobs", "2", "--timesteps", "200", "--checkpoint-every", "1"),
-    *("--ppo.episodes", "2", "--ppo.batch-size", "16", "--ppo.epochs", "1", "--ppo.hidden", "8"),
-    *("--ppo.log-std", "-1.0", "-1.2", "--ppo.ramp", "1", "--evaluation-episodes", "2"),
+    *("--ppo.episodes", "2", "--ppo.batch-size", "16", "--ppo.epochs", "1", "--ppo.ramp", "1"),
+    *("--ppo.hidden", "8", "--ppo.critic-hidden", "8", "--ppo.log-std", "-1.0", "-1.2"),
+    *("--ppo.warmup", "1", "--evaluation-episodes", "2"),
 )
 """Three updates of two episodes, four checkpoints; the policy changes from the second on."""
 

@@ -195,8 +195,11 @@ def _check_config(config: Any) -> JumpConfig:
     if isinstance(config, JumpConfig):
         return config
     given = check_mapping("config", config)
-    implied = {} if "residual" in given else {"residual_bandwidth": 15.0}
-    explicit = BEFORE_THERE_WAS_A_CHOICE | implied | dict(given)
+    implied: dict[str, Any] = {} if "residual" in given else {"residual_bandwidth": 15.0}
+    for field, value in BEFORE_THERE_WAS_A_CHOICE.items():
+        if not _holds(given, path_to(field)):
+            implied[field] = value
+    explicit = implied | dict(given)
     checked = JumpConfig.of(**explicit)
     for field in TASK_FIELDS:
         # Else the policy would change with the default.

@@ -1,8 +1,10 @@
 """A critic that sees the world: the actor does not."""
 
+import dataclasses
 from functools import partial
 
 import numpy as np
+import pytest
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv
 from tiny_run import PPO
@@ -16,14 +18,15 @@ OPTIONS = TrainOptions(
 )
 
 
-def make():
-    inputs, axes = OPTIONS.input_names, OPTIONS.axes
-    env = DummyVecEnv([partial(LaunchEnv, OPTIONS.env, inputs, axes, True)])
-    return make_model(OPTIONS, env), env
+def make(hidden=(8,)):
+    options = dataclasses.replace(OPTIONS, ppo=dataclasses.replace(PPO, hidden=hidden))
+    env = DummyVecEnv([partial(LaunchEnv, options.env, options.input_names, options.axes, True)])
+    return make_model(options, env), env
 
 
-def test_the_critic_sees_all_and_the_actor_the_observation(rng):
-    model, env = make()
+@pytest.mark.parametrize("hidden", [(8,), ()])
+def test_the_critic_sees_all_and_the_actor_the_observation(rng, hidden):
+    model, env = make(hidden)
     n, size = len(OPTIONS.input_names), env.observation_space.shape[0]
     assert size > n
     with torch.no_grad():

@@ -1,10 +1,12 @@
 """What train.py can be asked for, on the command line and in files."""
 
 import json
+from pathlib import Path
 
 import pytest
 from tiny_run import UNUSUAL
 
+import agents
 from agents.options import TASK, PPOOptions, TrainOptions, read_options
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import TorqueConfig
@@ -12,7 +14,9 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.report.output import write_json
 from icub_jump_env.observation import DEFAULT
 from icub_jump_env.planning.residual import ResidualConfig
+from icub_jump_env.robot.icub import JOINT_NAMES
 from icub_jump_env.shortcuts import Shortcuts
+from icub_jump_env.versions import VERSIONS
 
 
 @pytest.mark.parametrize("options", [TrainOptions(), UNUSUAL], ids=["default", "unusual"])
@@ -96,13 +100,13 @@ def test_a_missing_file_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"inputs": "some"}, "inputs='some' is not allowed: one of 'all', 'command'"),
+        ({"inputs": "some"}, "inputs='some' is not allowed: one of 'all', 'balance', 'command'"),
         ({"axes": ("vertical", "forward")}, "in this order"),
         ({"timesteps": 0}, "timesteps=0 is not allowed: a whole number from 1 to 1000000000"),
         ({"seed": 2**32}, "seed=4294967296 is not allowed: a whole number from 0 to 4294967295"),
         ({"jobs": 0}, "jobs=0 is not allowed: a whole number from 1 to 1000"),
         ({"checkpoint_every": 0}, "checkpoint_every=0 is not allowed: a whole number from 1"),
-        ({"jobs": 7}, "jobs=7 is not allowed: a divisor of ppo.episodes=64"),
+        ({"jobs": 7}, "jobs=7 is not allowed: a divisor of ppo.episodes=128"),
         (
             {"env": JumpConfig.of(render_mode="rgb_array")},
             "render_mode='rgb_array' is not allowed",
@@ -149,6 +153,27 @@ def test_a_plan_sees_the_command_and_the_time_alone():
         *("phase.launch", "phase.flight", "phase.landing", "launch_progress", "time"),
         *("jump_height", "com_displacement", "takeoff_time"),
     )
+
+
+def test_who_balances_sees_all_but_the_joints_of_now_and_before():
+    env = TASK.replace(observation={"history": 2})
+    seen = TrainOptions(env=env, inputs="balance").input_names
+    assert {"gravity.x", "gravity@2.x", "foot_force.left"} < set(seen)
+    unseen = [name for name in env.layout.scales if name not in seen]
+    assert len(unseen) == 2 * len(JOINT_NAMES)
+    assert all(name.startswith("joint_") for name in unseen)
+
+
+def test_the_task_of_disturbed_worlds_is_a_jump_of_v1():
+    options = read_options(Path(agents.__file__).parent / "hyperparameters" / "disturbed.json")
+    jump = JumpConfig.of(
+        **VERSIONS["ICubJump-v1"],
+        jump_height=(0.04, 0.06),
+        randomization="disturbed",
+        residual_axes=options.axes,
+        reward=options.env.reward,
+    )
+    assert options.env == jump
 
 
 def test_the_default_folder_is_named_by_controller_and_seed():

@@ -1,6 +1,7 @@
 """PPO starts at the baseline, and what is exported acts as what was trained."""
 
 import dataclasses
+from contextlib import closing
 from functools import partial
 
 import numpy as np
@@ -9,9 +10,19 @@ import torch
 from stable_baselines3.common.vec_env import DummyVecEnv
 from tiny_run import PPO
 
+from agents.checkpoints import segment_seeds
 from agents.environment import LaunchEnv, acting_steps
 from agents.options import TASK, TrainOptions
-from agents.ppo import export, freeze_policy, make_model, set_noise
+from agents.ppo import (
+    LEAST_SPREAD,
+    WHITENING_EPISODES,
+    export,
+    freeze_policy,
+    make_model,
+    set_noise,
+    whiten,
+)
+from agents.vec_env import JumpVecEnv
 from icub_jump_env.evaluation.episodes.rollout import make_env
 from icub_jump_env.observation import DEFAULT
 from icub_jump_env.planning.residual import COM_AXES as AXES
@@ -74,8 +85,64 @@ def test_the_noise_follows_its_schedule():
     options, model = make(ppo=dataclasses.replace(PPO, log_std=(-1.0, -2.0)))
     for steps, expected in ((0, -1.0), (250, -1.25), (1000, -2.0), (1500, -2.0)):
         model.num_timesteps = steps
-        set_noise(model, options)
-        assert model.policy.log_std.tolist() == [expected, expected]
+        assert np.log(set_noise(model, options)) == pytest.approx(expected)
+        np.testing.assert_allclose(model.policy.log_std.detach(), expected, rtol=0, atol=1e-6)
+
+
+def test_the_noise_of_an_episode_is_one_multiple_of_the_hidden_layer_and_another_in_the_next():
+    options, model = make()
+    rollouts = []
+
+    def watch(local, _):
+        buffer = local["rollout_buffer"]
+        if buffer.pos == buffer.buffer_size - 1:  # the step that ends it is yet to be written
+            seen = torch.tensor(buffer.observations[:-1, 0])
+            actions = torch.tensor(buffer.actions[:-1, 0])
+            with torch.no_grad():
+                mean = model.policy.get_distribution(seen).mode()
+                features = model.policy.features_extractor(seen)
+                hidden = model.policy.mlp_extractor.forward_actor(features)
+            rollouts.append((hidden.numpy(), (actions - mean).numpy()))
+        return True
+
+    set_noise(model, options)
+    model.learn(ROLLOUT, callback=watch)
+    ((hidden, noise),) = rollouts
+    length = acting_steps(options.env)
+
+    def misfit(steps):
+        multiple = np.linalg.lstsq(hidden[steps], noise[steps], rcond=None)[0]
+        return np.abs(noise[steps] - hidden[steps] @ multiple).max()
+
+    first, second = slice(0, length), slice(length, None)
+    assert misfit(first) < 1e-4
+    assert misfit(second) < 1e-4
+    assert misfit(slice(None)) > 1e-2
+
+
+@pytest.mark.parametrize("hidden", [(8,), ()])
+def test_observations_of_the_baseline_get_mean_zero_and_deviation_one(hidden):
+    """And the noise of its actions is as large as it should be."""
+    ppo = dataclasses.replace(PPO, hidden=hidden, log_std=(-1.5, -1.5))
+    options = dataclasses.replace(OPTIONS, ppo=ppo, jobs=2)
+    make = partial(LaunchEnv, options.env, options.input_names, options.axes)
+    with closing(JumpVecEnv([make] * 2)) as env:
+        model = make_model(options, env)
+        whiten(model, options)
+        env.reset_all(segment_seeds(options.seed, 0, 2))
+        still = np.zeros((2, 2), np.float32)
+        steps = WHITENING_EPISODES * acting_steps(options.env)
+        seen = np.concatenate([env.step(still)[0] for _ in range(steps)])
+    white = model.policy.features_extractor(torch.tensor(seen)).numpy()
+    assert np.abs(white.mean(axis=0)).max() < 1e-3
+    varies = seen.std(axis=0) > LEAST_SPREAD
+    assert 10 < varies.sum() < 80
+    np.testing.assert_allclose(white[:, varies].std(axis=0), 1.0, rtol=0, atol=1e-2)
+    assert white[:, ~varies].std(axis=0).max() < LEAST_SPREAD
+    set_noise(model, options)
+    with torch.no_grad():
+        noise = model.policy.get_distribution(torch.tensor(seen)).distribution.stddev
+    assert noise.square().mean().sqrt().log().item() == pytest.approx(-1.5, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -91,8 +158,9 @@ def test_the_exported_policy_acts_as_the_model(rng, inputs, axes):
     names = list(DEFAULT.scales)
     columns = [names.index(name) for name in options.input_names]
     rows = [AXES.index(axis) for axis in axes]
-    policy = export(model, options, 0.5)
     observations = rng.uniform(-2, 2, (200, 80)).astype(np.float32)
+    model.policy.features_extractor.measure(torch.tensor(observations[:, columns]))
+    policy = export(model, options, 0.5)
     ours = np.array([policy(observation) for observation in observations])
     theirs, _ = model.predict(observations[:, columns], deterministic=True)
     assert 0 < (np.abs(theirs) == 1).mean() < 1  # some are clipped, not all

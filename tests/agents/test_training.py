@@ -112,7 +112,7 @@ def test_tensorboard_has_the_numbers(whole):
     points = curve(whole)["evaluations"]
     scores = [(event.step, event.value) for event in events.Scalars("evaluation/score")]
     assert scores == [(point["timesteps"], pytest.approx(point["score"])) for point in points]
-    deviations = [event.value for event in events.Scalars("train/std")]
+    deviations = [event.value for event in events.Scalars("rollout/noise")]
     steps = [point["timesteps"] for point in points][:-1]
     assert deviations == pytest.approx([np.exp(-1.0 - 0.2 * step / 200) for step in steps])
     # The first update was the value function's.

@@ -1,5 +1,6 @@
 """One command remakes runs, shipped policies, rivals and the picture, and nothing twice."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 from tiny_run import ARGUMENTS, train, written
 
 from agents import training
+from agents.cli import asked
 from agents.options import TrainOptions
 from experiments import evidence, rivals
 from experiments.evidence import EvidenceError, EvidenceOptions, remake, trainings
+from experiments.shipped import REPOSITORY
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy
 
@@ -33,11 +36,13 @@ def calls(monkeypatch):
     monkeypatch.setattr(evidence, "CONTROLLERS", ("velocity",))
     monkeypatch.setattr(evidence, "ABLATIONS", {"forward": ("--axes", "forward")})
     monkeypatch.setattr(evidence, "ABLATION_SEEDS", range(1))
+    monkeypatch.setattr(evidence, "DISTURBED", ())
     named = trainings()
     fast = (*ARGUMENTS, "--timesteps", "1", "--jobs", "1")
     tiny = {name: (*words, *fast) for name, words in named.items()}
     monkeypatch.setattr(evidence, "trainings", lambda: tiny)
     monkeypatch.setattr(evidence, "TEST", range(3000, 3002))
+    monkeypatch.setattr(evidence, "FELT_TEST", range(3002, 3004))
     monkeypatch.setattr(rivals, "FORWARD", (0.0, 0.4))
     monkeypatch.setattr(rivals, "VERTICAL", (0.0,))
     monkeypatch.setattr(rivals, "_COMMANDS", 2)
@@ -53,11 +58,15 @@ def score(file):
 
 def test_everything_is_made_and_nothing_twice(calls):
     remake(EvidenceOptions())
-    names = [f"velocity-{run}" for run in ("seed0", "seed1", "plan-seed0", "forward-seed0")]
+    names = [
+        *("velocity-seed0", "velocity-seed1"),
+        *("disturbed-velocity-seed0", "disturbed-velocity-seed1"),
+        *("disturbed-velocity-plan-seed0", "disturbed-velocity-forward-seed0"),
+    ]
     assert sorted(file.stem for file in RUNS.glob("*.safetensors")) == sorted(names)
     assert len(list(RUNS.glob("*.curve.json"))) == len(names)
-    assert [words[0] for words in calls] == ["train.py"] * 4 + ["docs/update.py"]
-    plan = load_policy(RUNS / "velocity-plan-seed0.safetensors").card
+    assert [words[0] for words in calls] == ["train.py"] * 6 + ["docs/update.py"]
+    plan = load_policy(RUNS / "disturbed-velocity-plan-seed0.safetensors").card
     assert len(plan.inputs) == len(TrainOptions(inputs="command").input_names)
     assert Path("docs/images/learning.png").exists()
     candidates = [RUNS / f"velocity-seed{seed}.safetensors" for seed in (0, 1)]
@@ -72,11 +81,20 @@ def test_everything_is_made_and_nothing_twice(calls):
     for rival in ("constant", "open-loop"):
         card = load_policy(SHIPPED / f"velocity-{rival}.safetensors").card
         assert card.config == shipped.card.config
+    felt = load_policy(SHIPPED / "disturbed-velocity.safetensors").card
+    assert felt.results["test"]["seeds"] == (3002, 3004)
+    assert felt.config == shipped.card.config  # which is not so outside of this test
     before = written(SHIPPED)
     Path(RUNS, "velocity-old-seed0.json").touch()  # of an ablation that is no more
     remake(EvidenceOptions())
     assert written(SHIPPED) == before
-    assert [words[1] for words in calls[5:9]] == ["--resume"] * 4
+    assert [words[1] for words in calls[7:13]] == ["--resume"] * 6
+    for file in SHIPPED.glob("*.*"):
+        file.unlink()
+    made = len(calls)
+    remake(EvidenceOptions(train=False))
+    assert written(SHIPPED) == before
+    assert calls[made:] == [("docs/update.py",)]
 
 
 def test_runs_of_other_options_or_code_are_not_taken_for_these(calls, monkeypatch):
@@ -100,7 +118,16 @@ def test_a_command_that_fails_ends_it_with_its_words():
         evidence._run("-c", "raise SystemExit(3)")
 
 
-def test_every_kind_of_training_has_its_seeds():
+def test_every_kind_of_training_has_its_seeds(monkeypatch):
+    monkeypatch.chdir(REPOSITORY)
     named = trainings()
-    assert len(named) == 2 * 5 + 2 + len(evidence.ABLATIONS)
+    assert len(named) == 2 * (5 + 5 + 3) + 3 * len(evidence.ABLATIONS)
     assert named["torque-seed4"] == ("--controller", "torque", "--seed", "4")
+    plan = asked(named["disturbed-torque-plan-seed2"])
+    headline = asked(named["disturbed-torque-seed2"])
+    assert plan == dataclasses.replace(
+        headline, inputs="command", env=headline.env.replace(lean_correction=False), ppo=plan.ppo
+    )
+    assert plan.ppo.hidden
+    others = [asked(named[f"disturbed-velocity-{name}-seed0"]) for name in evidence.ABLATIONS]
+    assert asked(named["disturbed-velocity-seed0"]) not in others

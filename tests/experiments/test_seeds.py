@@ -18,8 +18,15 @@ def test_tuning_selection_test_and_training_share_no_episode():
         for seed in segment_seeds(run, number, jobs)
     }
     held_out = (
-        seeds.TEST, seeds.PLANNER_TEST, seeds.FORESIGHT_TEST, *seeds.LANDING_TEST.values(),
+        seeds.TEST, seeds.FELT_TEST, seeds.PLANNER_TEST, seeds.FORESIGHT_TEST,
+        *seeds.LANDING_TEST.values(),
     )  # fmt: skip
-    uses = [set(seeds.TUNING), *map(set, held_out), set(seeds.SELECTION), training]
+    uses = [
+        set(seeds.TUNING),
+        set(seeds.FELT_TUNING),
+        *map(set, held_out),
+        set(seeds.SELECTION),
+        training,
+    ]
     for one, other in itertools.combinations(uses, 2):
         assert not one & other

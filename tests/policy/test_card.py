@@ -276,6 +276,15 @@ def test_the_fields_are_sorted_into_two_kinds_with_none_forgotten():
     assert names == free | of_the_controller | set(TASK_FIELDS)
 
 
+def test_axes_and_bandwidth_are_read_as_they_were_written():
+    config = JumpConfig.of(residual_axes=("forward", "pitch"), residual_bandwidth=40.0)
+    card = make_card(
+        config=config, axes=("pitch",), observation=tuple(config.layout.scales.items())
+    )
+    assert through_json(card).config == config
+    check_match(through_json(card), config)
+
+
 def test_the_layout_must_match_by_name():
     entries = dict(observation.DEFAULT.scales)
     check_match(make_card(observation=tuple(reversed(entries.items()))), JumpConfig())
