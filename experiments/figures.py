@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from experiments.shipped import CURVE_SUFFIX
 from icub_jump_env.evaluation.figures.style import (
+    ACCENT,
     CONTENDERS,
     CONTROLLER,
     DESIRED,
     MEASURED,
     Figure,
+    describe,
     panels,
 )
 from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT
 from icub_jump_env.evaluation.statistics.intervals import interquartile_mean
+from icub_jump_env.planning.residual import AXES, COM_AXES, ResidualConfig
 
 if TYPE_CHECKING:
+    from experiments.feedback import Launches
     from experiments.frontier import Point
     from experiments.planners import Point as PlannerPoint
 
@@ -136,3 +143,58 @@ def learning_curves(folder: Path) -> Figure:
         axis.set(xlabel="steps (thousand)", ylabel=label)
     left.legend(frameon=False, loc="lower right")
     return figure
+
+
+def feedback_figure(launches: Launches, residual: ResidualConfig) -> Figure:
+    """What a policy does by the slope of the ground, and around a push; quartiles as bands.
+
+    Args:
+        launches: In which it was watched.
+        residual: What its actions mean.
+    """
+    figure, rows = panels((9.0, 5.0), rows=2, columns=len(residual.axes), sharey="col")
+    steep, hard = math.radians(2.0), 3.0
+    slopes = {
+        "rises ahead": launches.slope > steep,
+        "level": np.abs(launches.slope) < steep / 2,
+        "falls ahead": launches.slope < -steep,
+    }
+    pushes = {
+        "pushed forward": launches.push > hard,
+        "hardly pushed": np.abs(launches.push) < hard / 2,
+        "pushed backward": launches.push < -hard,
+    }
+    since = 1000 * (launches.time[None, :] - launches.push_time[:, None])
+    edges = np.arange(-100.0, 220.0, 20.0)
+    middles = (edges[:-1] + edges[1:]) / 2
+    for column, name in enumerate(residual.axes):
+        scale, unit = residual.scale[AXES.index(name)], "kg m²/s"
+        if name in COM_AXES:
+            scale, unit = CM * scale, "cm"
+        values = scale * launches.actions[:, :, column]
+        for label, color, chosen in _groups(slopes):
+            quartiles = np.percentile(values[chosen], [25, 50, 75], axis=0)
+            _band(rows[0, column], 1000 * launches.time, quartiles, color, label)
+        for label, color, chosen in _groups(pushes):
+            bins = [
+                values[chosen][(since[chosen] >= low) & (since[chosen] < high)]
+                for low, high in itertools.pairwise(edges)
+            ]
+            quartiles = np.array([np.percentile(each, [25, 50, 75]) for each in bins]).T
+            _band(rows[1, column], middles, quartiles, color, label)
+        describe(rows[0, column], f"{name}, by slope", unit, "time (ms)")
+        describe(rows[1, column], f"{name}, around a push", unit, "time since its end (ms)")
+    for row in rows:
+        row[0].legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _groups(groups: Mapping[str, NDArray[np.bool_]]) -> Iterator[tuple[str, str, Any]]:
+    for (label, chosen), color in zip(groups.items(), (DESIRED, ACCENT, MEASURED), strict=True):
+        yield label, color, chosen
+
+
+def _band(axis: Axes, x: Any, quartiles: NDArray[np.float64], color: str, label: str) -> None:
+    low, middle, high = quartiles
+    axis.fill_between(x, low, high, color=color, alpha=0.2, lw=0)
+    axis.plot(x, middle, color=color, lw=1.8, label=label)
