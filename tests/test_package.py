@@ -144,7 +144,7 @@ def test_wheel_ships_the_agents_the_policies_and_the_command(wheel):
     agents = {
         f"icub_jump_env/agents/{file.relative_to(folder)}"
         for file in folder.rglob("*")
-        if file.suffix in (".py", ".yml")
+        if file.suffix in (".py", ".yml", ".json")
     }
     assert agents == {name for name in names if name.startswith("icub_jump_env/agents/")}
     folder = "icub_jump_env/policy/shipped"
