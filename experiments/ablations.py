@@ -3,7 +3,8 @@
     python -m experiments.ablations --jobs 2
 
 prints one row per kind of training in experiments/runs: what it reaches and what it
-gains over the baseline. An interrupted evaluation goes on where it stopped.
+gains over the baseline of its task, with the law where the task has it. An interrupted
+evaluation goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ from icub_jump_env.evaluation.report.output import new_table, show
 from icub_jump_env.evaluation.statistics.intervals import CONFIDENCE, interquartile_mean
 
 _NAME = re.compile(r"(?P<kind>[\w-]+)-seed\d+")
+HEADLINES = (*CONTROLLERS, *(f"disturbed-{controller}" for controller in CONTROLLERS))
+"""Kinds of training that others are ablations of."""
+
 _EPISODES = 200
 _RESAMPLES = 5000
 
@@ -82,14 +86,16 @@ def compare_trainings(options: AblationOptions) -> None:
         "gain",
         "min",
     )
-    for kind, members in sorted(kinds.items(), key=lambda item: item[0] not in CONTROLLERS):
-        config = judged_config(members[0])
-        baseline = _jumps(config, BASELINE, options, progress)
-        if kind in CONTROLLERS:
-            _add(table, f"{kind}, baseline", baseline)
-        jumps = np.stack([_jumps(config, member, options, progress) for member in members])
-        name = f"{kind} (single seed)" if len(members) == 1 else kind
-        _add(table, name, jumps, baseline, [_minutes(member.name) for member in members])
+    for headline in (kind for kind in HEADLINES if kind in kinds):
+        baseline = _jumps(judged_config(kinds[headline][0]), BASELINE, options, progress)
+        _add(table, f"{headline}, baseline", baseline)
+        for kind in sorted(kind for kind in kinds if headline_of(kind) == headline):
+            members = kinds[kind]
+            jumps = np.stack(
+                [_jumps(judged_config(member), member, options, progress) for member in members]
+            )
+            name = f"{kind} (single seed)" if len(members) == 1 else kind
+            _add(table, name, jumps, baseline, [_minutes(member.name) for member in members])
     table.caption = (
         f"{seeds(TEST[: options.episodes])}; interquartile means over the training "
         "seeds; gain over the baseline in the same episodes, with its bootstrap interval of 95 %: "
@@ -97,6 +103,11 @@ def compare_trainings(options: AblationOptions) -> None:
         "seed: over the episodes of one training alone, so another seed may well differ by more"
     )
     show(console, table)
+
+
+def headline_of(kind: str) -> str | None:
+    """The kind of training of which this one is an ablation, or itself."""
+    return max((name for name in HEADLINES if kind.startswith(name)), key=len, default=None)
 
 
 def _jumps(

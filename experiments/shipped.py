@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.options import TASK
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.episodes.contender import Contender, as_trained
+from icub_jump_env.evaluation.episodes.contender import Contender
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -20,9 +19,9 @@ CURVE_SUFFIX = ".curve.json"
 
 
 def judged_config(contender: Contender) -> JumpConfig:
-    """The task's commands and worlds, with what a policy depends on as in its training."""
+    """The commands and worlds of its training."""
     assert contender.card is not None  # it was read from a file
-    return as_trained(contender.card, TASK)
+    return contender.card.config
 
 
 def selection_of(contender: Contender) -> Mapping[str, Any]:

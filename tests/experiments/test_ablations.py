@@ -9,8 +9,13 @@ import pytest
 from scipy.stats import trim_mean
 
 from agents.options import TASK
-from experiments import ablations, shipped
-from experiments.ablations import AblationOptions, compare_trainings, runs_interval
+from experiments import ablations
+from experiments.ablations import (
+    AblationOptions,
+    compare_trainings,
+    headline_of,
+    runs_interval,
+)
 from experiments.figures import learning_curves
 from experiments.rivals import constant_shift
 from icub_jump_env.errors import ConfigError
@@ -35,7 +40,6 @@ def curve(shift, points=3):
 
 @pytest.fixture
 def runs(monkeypatch):
-    monkeypatch.setattr(shipped, "TASK", CONFIG)
     monkeypatch.setattr(ablations, "TEST", SEEDS)
     monkeypatch.setattr(ablations, "RUNS", Path("kept"))
     monkeypatch.setattr(ablations, "_RESAMPLES", 200)
@@ -83,6 +87,19 @@ def test_each_kind_has_a_row_with_what_its_policies_do(runs, capsys):
     assert gain == pytest.approx(trim_mean(rises, 0.25) - rises[0], abs=0.006)
     assert low < gain < high
     assert "seeds 3000 to 3001; interquartile means over the training seeds" in out
+
+
+@pytest.mark.parametrize(
+    ("kind", "headline"),
+    [
+        ("torque", "torque"),
+        ("velocity-still", "velocity"),
+        ("disturbed-velocity-history", "disturbed-velocity"),
+        ("other", None),
+    ],
+)
+def test_an_ablation_belongs_to_the_headline_that_it_is_named_after(kind, headline):
+    assert headline_of(kind) == headline
 
 
 class TestRunsInterval:

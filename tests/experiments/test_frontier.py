@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from agents.options import TASK
-from experiments import frontier, shipped
+from experiments import frontier
 from experiments.frontier import FrontierOptions, Point, judged, rivals, run_frontier
 from experiments.rivals import constant_shift
 from icub_jump_env.errors import ConfigError
@@ -53,7 +53,6 @@ class TestRivals:
 @pytest.fixture
 def small(monkeypatch):
     task = TASK.replace(stand_time=0.1)
-    monkeypatch.setattr(shipped, "TASK", task)
     for name, value in {
         "COMMANDS": (0.04, 0.06), "DISPLACEMENTS": (0.1,),
         "TEST": range(3000, 3003), "_GRID_SEEDS": range(2), "SHIPPED": Path("shipped"),
