@@ -30,6 +30,7 @@ class Whitening(BaseFeaturesExtractor):
     """Shifts and scales observations: those of the baseline get mean 0 and standard deviation 1.
 
     A lean of a degree, which decides a jump, is 0.02 in the observation, and lost among the rest.
+    Not ``VecNormalize``: its statistics go on changing, and no checkpoint of a policy has them.
 
     Attributes:
         mean: (n,) of each entry.
@@ -103,7 +104,7 @@ def whiten(model: PPO, options: TrainOptions) -> None:
     assert isinstance(env, JumpVecEnv)
     assert isinstance(whitening, Whitening)
     env.reset_all(segment_seeds(options.seed, 0, env.num_envs))
-    none = np.zeros((env.num_envs, len(options.axes)), np.float32)
+    none = np.zeros((env.num_envs, *(env.action_space.shape or ())), np.float32)
     steps = WHITENING_EPISODES * acting_steps(options.env)
     seen = np.concatenate([env.step(none)[0] for _ in range(steps)])
     whitening.measure(torch.as_tensor(seen))

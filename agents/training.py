@@ -283,13 +283,15 @@ class _Run(BaseCallback):
         share = (self._updates + 1) / (ppo.ramp + 1)
         return max(1e-3, ppo.action_scale * min(1.0, share))
 
+    def _on_training_start(self) -> None:
+        if not self._resumed:
+            whiten(self.model, self._options)
+
     def _on_rollout_start(self) -> None:
         if self._resumed:
             self._resumed = False
             self._begin_segment()
         elif self._updates % self._options.checkpoint_every == 0:
-            if self._updates == 0:
-                whiten(self.model, self._options)
             self._checkpoint()
             self._begin_segment()
         self.logger.record("rollout/noise", set_noise(self.model, self._options))

@@ -107,7 +107,7 @@ def compare_trainings(options: AblationOptions) -> None:
 
 def headline_of(kind: str) -> str | None:
     """The kind of training of which this one is an ablation, or itself."""
-    return max((name for name in HEADLINES if kind.startswith(name)), key=len, default=None)
+    return next((name for name in HEADLINES if kind.startswith(name)), None)
 
 
 def _jumps(
@@ -143,20 +143,33 @@ def _add(
 ) -> None:
     """A row: jumps (seeds, 3, n) against those of the baseline (3, n)."""
     known = [value for value in minutes if not math.isnan(value)]
-    cells = []
-    for quantity, decimals in enumerate((1, 2, 2)):
-        means = np.atleast_2d(jumps[..., quantity, :]).mean(axis=1)
-        cells.append(f"{interquartile_mean(means):.{decimals}f}")
-        if baseline is None:
-            cells.append("-")
-            continue
-        gains = jumps[:, quantity] - baseline[quantity]
-        values = (interquartile_mean(gains.mean(axis=1)), *runs_interval(gains))
-        gain, low, high = (f"{value:+.{decimals}f}" for value in values)
-        cells.append(f"{gain} ({low} to {high})")
+    each = jumps.reshape(-1, *jumps.shape[-2:])
+    cells = cells_of(each, None if baseline is None else each - baseline)
     table.add_row(
         name, str(len(minutes) or "-"), *cells, f"{np.mean(known):.0f}" if known else "-"
     )
+
+
+def cells_of(jumps: Array, gains: Array | None, confidence: float = CONFIDENCE) -> list[str]:
+    """Cells of a table: of each quantity its mean over training seeds, and the gain in it.
+
+    Args:
+        jumps: Success, rise and soles of each training in each episode (seeds, 3, n).
+        gains: What is gained in them, likewise; None where nothing is compared.
+        confidence: Of the intervals.
+    """
+    cells = []
+    for quantity, decimals in enumerate((1, 2, 2)):
+        mean = interquartile_mean(jumps[:, quantity].mean(axis=1))
+        cells.append(f"{mean:.{decimals}f}")
+        if gains is None:
+            cells.append("-")
+            continue
+        gained = gains[:, quantity]
+        values = (interquartile_mean(gained.mean(axis=1)), *runs_interval(gained, confidence))
+        gain, low, high = (f"{value:+.{decimals}f}" for value in values)
+        cells.append(f"{gain} ({low} to {high})")
+    return cells
 
 
 def runs_interval(gains: Array, confidence: float = CONFIDENCE) -> tuple[float, float]:

@@ -18,25 +18,29 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from experiments.ablations import Array, jumps_of, runs_interval
+from experiments.ablations import Array, cells_of, jumps_of
+from experiments.headroom import starts
 from experiments.rivals import best_constant, open_loop
 from experiments.seeds import FELT_TEST, TUNING
-from experiments.shipped import RUNS, best_of
+from experiments.shipped import RUNS, best_of, judged_config
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.episodes.failures import failure_of
-from icub_jump_env.evaluation.episodes.rollout import Episode, make_env
+from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.episodes.series import Series
 from icub_jump_env.evaluation.quantities import CM, seeds
 from icub_jump_env.evaluation.report.output import new_table, show
-from icub_jump_env.evaluation.statistics.intervals import CONFIDENCE, interquartile_mean
-from icub_jump_env.planning.lean import lean_correction
+from icub_jump_env.evaluation.statistics.intervals import CONFIDENCE
+from icub_jump_env.planning.lean import MOMENTUM_PER_LEAN
+from icub_jump_env.planning.residual import AXES
 from icub_jump_env.policy import ReplayPolicy
 
 TUNED_ON = TUNING[:100]
+LAW, OURS = "lean felt: the law", "policy on the law"
+
 HIGHER = (-0.005, 0.0, 0.005, 0.01)
 """By which the law is asked to jump higher than the command (m)."""
 
@@ -103,24 +107,19 @@ def policies(kind: str) -> list[Contender]:
 
 def felt_by_none(policy: ReplayPolicy, config: JumpConfig) -> ReplayPolicy:
     """Replayed actions, and with them what the law does in the mean."""
-    env, corrections = make_env(config), []
-    for seed in TUNED_ON:
-        env.reset(seed=seed)
-        gravity = env._simulation.sensors.readings.gravity
-        corrections.append(lean_correction(gravity, env._controller.plan.stance))
-    env.close()
-    matrix = config.residual.matrix
-    action = np.linalg.lstsq(matrix, np.mean(corrections, axis=0), rcond=None)[0]
-    actions = np.clip(policy.actions + action.astype(np.float32), -1.0, 1.0)
-    return dataclasses.replace(policy, actions=actions)
+    backward = np.mean([max(0.0, -start.lean[0]) for start in starts(config, TUNED_ON)])
+    actions, pitch = policy.actions.copy(), policy.axes.index("pitch")
+    actions[..., pitch] += (
+        MOMENTUM_PER_LEAN * backward / config.residual.scale[AXES.index("pitch")]
+    )
+    return dataclasses.replace(policy, actions=np.clip(actions, -1.0, 1.0))
 
 
 def arms(controller: ControllerName, jobs: int, progress: Console) -> list[Arm]:
     """All of them, the policies last."""
     trained = policies(f"disturbed-{controller}")
     best = best_of(trained)
-    assert best.card is not None  # it was read from a file
-    law = best.card.config
+    law = judged_config(best)
     unfelt = law.replace(lean_correction=False)
     plans = policies(f"disturbed-{controller}-plan")
     replay = open_loop(best.policy, law, progress, TUNED_ON)
@@ -138,11 +137,11 @@ def arms(controller: ControllerName, jobs: int, progress: Console) -> list[Arm]:
         Arm("constant", unfelt, [constant(unfelt)]),
         Arm("plan", unfelt, plans),
         Arm("replay", unfelt, [named("replay with the mean law", felt_by_none(replay, law))]),
-        Arm("lean felt: the law", law),
+        Arm(LAW, law),
         Arm("law and constant", law, [constant(law)]),
         Arm("law and replay", law, [named("replay", replay)]),
     ]
-    ours = Arm("policy on the law", law, trained)
+    ours = Arm(OURS, law, trained)
     return [*before, *strongest(law, ours, jobs, progress), ours]
 
 
@@ -177,20 +176,8 @@ def render(compared: Sequence[Arm], jumps: Sequence[Array], used: range) -> Tabl
         "soles, cm", "policy gains",
     )  # fmt: skip
     for arm, done in zip(compared, jumps, strict=True):
-        cells = []
-        for quantity, decimals in enumerate((1, 2, 2)):
-            mean = interquartile_mean(done[:, quantity].mean(axis=1))
-            cells.append(f"{mean:.{decimals}f}")
-            if done is ours:
-                cells.append("-")
-                continue
-            gains = ours[:, quantity] - done[:, quantity].mean(axis=0)
-            values = (
-                interquartile_mean(gains.mean(axis=1)), *runs_interval(gains, confidence)
-            )  # fmt: skip
-            gain, low, high = (f"{value:+.{decimals}f}" for value in values)
-            cells.append(f"{gain} ({low} to {high})")
-        table.add_row(arm.name, str(len(done)), *cells)
+        gains = None if done is ours else ours - done.mean(axis=0)
+        table.add_row(arm.name, str(len(done)), *cells_of(done, gains, confidence))
     table.caption = (
         f"{seeds(used)}; interquartile means over trainings; intervals over training seeds and "
         f"episodes, of 95 % for the {len(others)} comparisons together"
@@ -203,8 +190,10 @@ def compare(options: ArmsOptions) -> None:
     console, progress = Console(), Console(stderr=True)
     compared = arms(options.controller, options.jobs, progress)
     used = FELT_TEST[: options.episodes]
-    law, ours = next(arm for arm in compared if arm.name.endswith("the law")), compared[-1]
-    for world, these in (("disturbed", compared), ("hard", [law, ours])):
+    for world, these in (
+        ("disturbed", compared),
+        ("hard", [arm for arm in compared if arm.name in (LAW, OURS)]),
+    ):
         there = [
             dataclasses.replace(arm, config=arm.config.replace(randomization=world))
             for arm in these

@@ -15,6 +15,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from rich.console import Console
 
@@ -79,13 +80,11 @@ class EvidenceOptions:
 
     Attributes:
         jobs: Processes that evaluate in parallel.
-        train: Train, and not only make the rest of the policies in experiments/runs.
-        train_only: Train, and leave shipped policies and documents as they are.
+        only: Only the trainings, or only what is made of the policies in experiments/runs.
     """
 
     jobs: int = 1
-    train: bool = True
-    train_only: bool = False
+    only: Literal["trainings", "rest"] | None = None
 
     def __post_init__(self) -> None:
         check_count("jobs", self.jobs, 1, unit="processes")
@@ -116,15 +115,15 @@ def remake(options: EvidenceOptions) -> None:
             for or was made by other code.
     """
     console = Console(stderr=True)
-    for name, arguments in trainings().items():
-        if options.train:
+    if options.only != "rest":
+        for name, arguments in trainings().items():
             say(console, f"run {name}")
             _train(name, arguments)
     for file in RUNS.glob("*-seed*.*"):
         if file.name.split(".")[0] not in trainings():
             say(console, f"removing {file}, which is no longer trained")
             file.unlink()
-    if options.train_only:
+    if options.only == "trainings":
         return
     for controller in CONTROLLERS:
         shipped = _ship(controller, TEST, options.jobs, console)

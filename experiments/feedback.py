@@ -9,7 +9,6 @@ that differ in their slope, and after pushes forward and backward.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,13 +20,14 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.figures import feedback_figure
+from experiments.headroom import starts
+from experiments.rivals import Watched
 from experiments.seeds import TUNING
 from icub_jump_env.checks import check_count
 from icub_jump_env.control.config import ControllerName
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
-from icub_jump_env.evaluation.episodes.rollout import make_env
-from icub_jump_env.evaluation.quantities import seeds
+from icub_jump_env.evaluation.episodes.rollout import make_env, planned, run_episode
 from icub_jump_env.evaluation.report.output import (
     check_writable,
     new_table,
@@ -86,31 +86,24 @@ class Launches(NamedTuple):
 def watch(policy: LoadedPolicy, used: range, console: Console) -> Launches:
     """Launches with a policy, at the middle of its commands, so that they last equally long."""
     config = policy.card.config
-    config = config.replace(jump_height=sum(config.jump_heights) / 2)
-    env, names = make_env(config), list(config.layout.scales)
+    config = config.replace(jump_height=sum(config.jump_heights) / 2, early_end=True)
+    steps = int(planned(config).duration * config.agent_frequency)
+    names = list(config.layout.scales)
     columns = [names.index(name) for name in policy.card.inputs]
-    seen, done, worlds = [], [], []
+    env, seen, done, worlds = make_env(config), [], [], []
     with progress_display(console) as display:
-        for seed in display.track(used, description="watching"):
-            observation, info = env.reset(seed=seed)
-            duration = env._controller.plan.duration
-            world: Mapping[str, float] = info["world"]
-            end = world["push_time"] * (duration - PUSH_DURATION) + PUSH_DURATION
-            steps = int(duration * config.agent_frequency)
-            observations, actions = [], []
-            for _ in range(steps):
-                actions.append(policy(observation))
-                observations.append(observation[columns])
-                observation, _, over, *_ = env.step(actions[-1])
-                if over:  # a fall in the launch
-                    break
-            else:
-                worlds.append((world["slope"], world["push"], end))
-                seen.append(observations)
-                done.append(actions)
+        for seed, start in zip(
+            display.track(used, description="watching"), starts(config, used), strict=True
+        ):
+            watched = Watched(policy)
+            world = run_episode(env, seed, watched).world
+            if len(watched.actions) >= steps:  # else it fell in the launch
+                seen.append(np.array(watched.observations[:steps])[:, columns])
+                done.append(watched.actions[:steps])
+                worlds.append((world["slope"], world["push"], start.push + PUSH_DURATION))
     env.close()
     slope, push, push_time = np.array(worlds).T
-    time = np.arange(len(seen[0])) / config.agent_frequency
+    time = np.arange(steps) / config.agent_frequency
     return Launches(time, np.array(seen), np.array(done), slope, push, push_time)
 
 
@@ -125,9 +118,7 @@ def render(policy: LoadedPolicy, launches: Launches) -> Table:
     for axis, row in zip(network.axes, weight * spread, strict=True):
         largest = np.argsort(-np.abs(row))[:SHOWN]
         table.add_row(axis, *(f"{network.inputs[i]} {row[i]:+.2f}" for i in largest))
-    table.caption = (
-        f"{seeds(range(len(launches.slope)))}; action per standard deviation of the input"
-    )
+    table.caption = f"{len(launches.slope)} launches; action per standard deviation of the input"
     return table
 
 

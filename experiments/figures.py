@@ -173,15 +173,13 @@ def feedback_figure(launches: Launches, residual: ResidualConfig) -> Figure:
             scale, unit = CM * scale, "cm"
         values = scale * launches.actions[:, :, column]
         for label, color, chosen in _groups(slopes):
-            quartiles = np.percentile(values[chosen], [25, 50, 75], axis=0)
-            _band(rows[0, column], 1000 * launches.time, quartiles, color, label)
+            _band(rows[0, column], 1000 * launches.time, values[chosen].T, color, label)
         for label, color, chosen in _groups(pushes):
             bins = [
                 values[chosen][(since[chosen] >= low) & (since[chosen] < high)]
                 for low, high in itertools.pairwise(edges)
             ]
-            quartiles = np.array([np.percentile(each, [25, 50, 75]) for each in bins]).T
-            _band(rows[1, column], middles, quartiles, color, label)
+            _band(rows[1, column], middles, bins, color, label)
         describe(rows[0, column], f"{name}, by slope", unit, "time (ms)")
         describe(rows[1, column], f"{name}, around a push", unit, "time since its end (ms)")
     for row in rows:
@@ -194,7 +192,10 @@ def _groups(groups: Mapping[str, NDArray[np.bool_]]) -> Iterator[tuple[str, str,
         yield label, color, chosen
 
 
-def _band(axis: Axes, x: Any, quartiles: NDArray[np.float64], color: str, label: str) -> None:
-    low, middle, high = quartiles
+def _band(axis: Axes, x: Any, values: Sequence[Any], color: str, label: str) -> None:
+    """Quartiles of the values at each x, as far as there are any."""
+    low, middle, high = np.array(
+        [np.percentile(each, [25, 50, 75]) if len(each) else [np.nan] * 3 for each in values]
+    ).T
     axis.fill_between(x, low, high, color=color, alpha=0.2, lw=0)
     axis.plot(x, middle, color=color, lw=1.8, label=label)

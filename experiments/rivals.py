@@ -83,7 +83,7 @@ def open_loop(
         for i, command in enumerate(commands):
             env = make_env(dataclasses.replace(config, jump_height=float(command)))
             for seed in seeds[i :: len(commands)]:
-                watched = _Watched(policy)
+                watched = Watched(policy)
                 run_episode(env, seed, watched)
                 # A launch shorter than the longest one is followed by steps without effect;
                 # a fall may come before the longest one ends.
@@ -98,13 +98,21 @@ def open_loop(
     )
 
 
-class _Watched:
-    """A policy that remembers its actions."""
+class Watched:
+    """A policy that remembers what it saw and did.
+
+    Attributes:
+        observations: (n,) each.
+        actions: (axes,) each.
+    """
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
+        self.observations: list[NDArray[np.float32]] = []
         self.actions: list[NDArray[np.float32]] = []
 
     def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The action for an observation."""
+        self.observations.append(observation)
         self.actions.append(self._policy(observation))
         return self.actions[-1]

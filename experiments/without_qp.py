@@ -26,7 +26,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.environment import LaunchEnv
 from agents.options import SELECTION, TrainOptions
-from agents.ppo import make_model, set_noise
+from agents.ppo import make_model, set_noise, whiten
 from agents.vec_env import JumpVecEnv
 from experiments.headroom import configuration
 from icub_jump_env.checks import check_count
@@ -138,6 +138,7 @@ def learn(options: TrainOptions) -> list[dict[str, Any]]:
     make = partial(JointEnv, options.env, options.input_names)
     with contextlib.closing(JumpVecEnv([make] * options.jobs)) as envs:
         model = make_model(options, envs)
+        whiten(model, options)
         model.learn(options.timesteps, callback=_Noise(options))
     with contextlib.closing(make()) as env:
         return [play(model, env, seed) for seed in SELECTION]

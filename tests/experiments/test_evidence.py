@@ -92,7 +92,7 @@ def test_everything_is_made_and_nothing_twice(calls):
     for file in SHIPPED.glob("*.*"):
         file.unlink()
     made = len(calls)
-    remake(EvidenceOptions(train=False))
+    remake(EvidenceOptions(only="rest"))
     assert written(SHIPPED) == before
     assert calls[made:] == [("docs/update.py",)]
 
@@ -100,16 +100,16 @@ def test_everything_is_made_and_nothing_twice(calls):
 def test_runs_of_other_options_or_code_are_not_taken_for_these(calls, monkeypatch):
     (name, words), *_ = evidence.trainings().items()
     monkeypatch.setattr(evidence, "trainings", lambda: {name: words})
-    remake(EvidenceOptions(train_only=True))
+    remake(EvidenceOptions(only="trainings"))
     assert not list(SHIPPED.glob("*.safetensors"))
     made = len(calls)
     with monkeypatch.context() as patch:
         patch.setattr(evidence, "trainings", lambda: {name: (*words, "--ppo.epochs", "2")})
         with pytest.raises(EvidenceError, match=f"{name} holds a run with other options"):
-            remake(EvidenceOptions(train_only=True))
+            remake(EvidenceOptions(only="trainings"))
     monkeypatch.setattr(training, "source", lambda: "0" * 16)
     with pytest.raises(EvidenceError, match=f"{name} holds a run of other code"):
-        remake(EvidenceOptions(train_only=True))
+        remake(EvidenceOptions(only="trainings"))
     assert len(calls) == made  # neither went on
 
 

@@ -95,13 +95,6 @@ def test_the_picture_has_the_middle_of_each_group():
 def test_the_command_prints_and_draws(monkeypatch, capsys):
     monkeypatch.setattr(feedback, "SHIPPED", Path("shipped"))
     saved(LINEAR)
-    monkeypatch.setattr(feedback, "feedback_figure", lambda *_: feedback_figure_of_nothing())
     run(FeedbackOptions(episodes=2, plot=Path("drawn")))
     assert "gyro.y" in capsys.readouterr().out
     assert Path("drawn/feedback_velocity.png").exists()
-
-
-def feedback_figure_of_nothing():
-    from icub_jump_env.evaluation.figures.style import figure_of
-
-    return figure_of((1.0, 1.0))

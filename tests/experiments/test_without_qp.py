@@ -51,6 +51,15 @@ def test_it_learns_and_plays(monkeypatch):
         assert info["outcome"] in ("stood", "fell", "no take-off")
 
 
+def test_what_it_sees_is_whitened_as_in_any_training(monkeypatch):
+    monkeypatch.setattr("experiments.without_qp.SELECTION", range(1))
+    monkeypatch.setattr("experiments.without_qp.play", lambda model, env, seed: model)
+    (model,) = learn(TrainOptions(env=CONFIG, ppo=PPO, jobs=1, timesteps=10))
+    whitening = model.policy.features_extractor
+    assert whitening.mean.any()
+    assert whitening.hidden_norm != 1.0
+
+
 @pytest.mark.parametrize("change", [{"jobs": 0}, {"timesteps": 0}, {"seeds": 0}])
 def test_bad_options_are_refused(change):
     with pytest.raises(ConfigError, match=next(iter(change))):
