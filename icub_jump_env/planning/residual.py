@@ -140,6 +140,8 @@ class ResidualFilter(Record):
         # Few numbers at each control tick: floats take a third of the time of arrays.
         now = zip(goals, self.offset.tolist(), self.velocity.tolist(), strict=True)
         for axis, (goal, offset, velocity) in enumerate(now):
+            if goal == offset == velocity == 0.0:
+                continue
             error = offset - goal
             slope = velocity + w * error
             error_next = (error + slope * dt) * decay
