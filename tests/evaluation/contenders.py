@@ -29,6 +29,15 @@ def evaluate(capsys, *arguments):
     return code, captured.out, captured.err
 
 
+def refusal(capsys, *arguments):
+    """The one line that it refuses with."""
+    code, out, err = evaluate(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    return err
+
+
 def constant(*action):
     """The network that always does the same."""
     return NetworkPolicy((), ((np.zeros((3, 0), np.float32), np.array(action, np.float32)),))
