@@ -22,8 +22,6 @@ from icub_jump_env.metrics.jump import SuccessConfig
 from icub_jump_env.planning.residual import ResidualConfig
 from icub_jump_env.simulation.randomization import Randomization
 
-REPOSITORY = Path(__file__).parents[2]
-
 FAST = ["--randomization", "full", "--stand-time", "0.0"]
 
 
