@@ -55,8 +55,9 @@ def test_every_arm_jumps_the_held_out_episodes_of_its_own_configuration(small, c
         "nothing felt: zero", "constant", "plan", "replay",
         "lean felt: the law", "law and constant", "law and replay",
     ]  # fmt: skip
-    assert names[-3:] == ["policy on the law", "lean felt: the law", "policy on the law"]
-    assert [row[1] for row in found if row[0] == "policy on the law"] == ["2", "2"]
+    both = ["policy on the law", "policy on the law, +0.2 cm"]
+    assert names[-6:] == [*both, "lean felt: the law", "lean felt: the law, +0.2 cm", *both]
+    assert [row[1] for row in found if row[0] in both] == ["2"] * 4
 
     def rise(config, *shifts):
         env = make_env(config.replace(randomization="disturbed"))
@@ -68,12 +69,16 @@ def test_every_arm_jumps_the_held_out_episodes_of_its_own_configuration(small, c
         return f"{100 * np.nan_to_num(rises).mean():.2f}"
 
     unfelt = CONFIG.replace(lean_correction=False)
-    by_name = {row[0]: row for row in found[:-2]}
+    by_name = {row[0]: row for row in found[:-4]}
     assert by_name["nothing felt: zero"][4] == rise(unfelt, (0.0, 0.0, 0.0))
     assert by_name["plan"][4] == rise(unfelt, (0.3, 0.0, 0.0))
     assert by_name["lean felt: the law"][4] == rise(CONFIG, (0.0, 0.0, 0.0))
     assert by_name["law and replay"][4] == rise(CONFIG, (0.1, 0.0, 0.0))  # of the best run
-    assert by_name["policy on the law"][4] == rise(CONFIG, (0.0, 0.0, 0.0), (0.1, 0.0, 0.0))
+    ours = (0.0, 0.0, 0.0), (0.1, 0.0, 0.0)
+    assert by_name["policy on the law"][4] == rise(CONFIG, *ours)
+    low, high = CONFIG.jump_heights
+    asked = CONFIG.replace(jump_height=(low + 0.002, high + 0.002))
+    assert by_name["policy on the law, +0.2 cm"][4] == rise(asked, *ours)
 
 
 def test_what_is_asked_to_jump_higher_is_judged_by_the_command():
