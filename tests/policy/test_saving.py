@@ -214,7 +214,8 @@ KINDS = {"": "network", "-constant": "network", "-open-loop": "replay"}
 
 def test_the_shipped_policies_are_those_of_both_controllers():
     assert shipped_policies() == [
-        f"{controller}{kind}" for controller in ("torque", "velocity") for kind in KINDS
+        "disturbed-velocity",
+        *(f"{controller}{kind}" for controller in ("torque", "velocity") for kind in KINDS),
     ]
 
 
