@@ -26,6 +26,7 @@ from experiments.shipped import RUNS, best_of, judged_config
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
+from icub_jump_env.errors import PolicyFileError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.episodes.failures import failure_of
@@ -107,8 +108,14 @@ class Arm:
 
 
 def policies(kind: str) -> list[Contender]:
-    """The policies of a kind of training."""
+    """The policies of a kind of training.
+
+    Raises:
+        PolicyFileError: If there are none.
+    """
     files = sorted(RUNS.glob(f"{kind}-seed*.safetensors"))
+    if not files:
+        raise PolicyFileError(f"{RUNS}/{kind}-seed*.safetensors", "no such files")
     return read_contenders([str(file) for file in files])
 
 

@@ -102,6 +102,23 @@ def test_every_command_of_eval_parses(document):
             cli.parse(EvalOptions, arguments)
 
 
+def anchors(document):
+    """Those that GitHub makes of the headings."""
+    headings = re.findall(r"^#+ (.+)$", document.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+def test_links_lead_somewhere(document):
+    for link in re.findall(r"\]\(([^)\s]+)\)", document.read_text()):
+        name, _, anchor = link.partition("#")
+        if "://" in name:
+            continue
+        file = document.parent / name if name else document
+        assert file.exists(), link
+        assert not anchor or anchor in anchors(file), link
+
+
 def test_the_controller_page_states_the_gains_in_use():
     page = (REPOSITORY / "docs" / "controller.md").read_text()
     velocity, torque, servo = VelocityConfig(), TorqueConfig(), ServoGains()

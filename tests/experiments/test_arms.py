@@ -12,6 +12,7 @@ from agents.options import TASK
 from experiments import ablations, arms, rivals
 from experiments.arms import Arm, ArmsOptions, compare, felt_by_none, render, strongest
 from experiments.rivals import constant_shift
+from icub_jump_env.errors import PolicyFileError
 from icub_jump_env.evaluation.episodes.contender import BASELINE
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.planning.lean import lean_correction
@@ -79,6 +80,11 @@ def test_every_arm_jumps_the_held_out_episodes_of_its_own_configuration(small, c
     low, high = CONFIG.jump_heights
     asked = CONFIG.replace(jump_height=(low + 0.002, high + 0.002))
     assert by_name["policy on the law, +0.2 cm"][4] == rise(asked, *ours)
+
+
+def test_trainings_that_are_missing_are_named(small):
+    with pytest.raises(PolicyFileError, match=r"disturbed-torque-seed\*"):
+        compare(ArmsOptions(controller="torque", episodes=2))
 
 
 def test_what_is_asked_to_jump_higher_is_judged_by_the_command():
