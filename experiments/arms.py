@@ -192,8 +192,18 @@ def strongest(law: JumpConfig, ours: Arm, jobs: int, progress: Console) -> list[
     ]
 
 
-def render(compared: Sequence[Arm], jumps: Sequence[Array], used: range) -> Table:
-    """A row for each arm; the last is compared with all others."""
+def render(
+    compared: Sequence[Arm], jumps: Sequence[Array], used: range, own: bool = False
+) -> Table:
+    """A row for each arm; the last is compared with all others.
+
+    Args:
+        compared: The arms.
+        jumps: What they did (k, 3, n).
+        used: Seeds of the episodes.
+        own: Whether runs are compared one by one, where there are as many; else with the mean of
+            the others.
+    """
     *others, ours = jumps
     confidence = 1.0 - (1.0 - CONFIDENCE) / max(1, len(others))
     table = new_table(
@@ -201,7 +211,8 @@ def render(compared: Sequence[Arm], jumps: Sequence[Array], used: range) -> Tabl
         "soles, cm", "policy gains",
     )  # fmt: skip
     for arm, done in zip(compared, jumps, strict=True):
-        gains = None if done is ours else ours - done.mean(axis=0)
+        theirs = done if own and len(done) == len(ours) else done.mean(axis=0)
+        gains = None if done is ours else ours - theirs
         table.add_row(arm.name, str(len(done)), *cells_of(done, gains, confidence))
     table.caption = (
         f"{seeds(used)}; interquartile means over trainings; intervals over training seeds and "

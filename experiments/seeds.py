@@ -12,6 +12,7 @@ __all__ = [
     "FORESIGHT_TEST",
     "LANDING_TEST",
     "PLANNER_TEST",
+    "REACTING_TEST",
     "SELECTION",
     "TEST",
     "TUNING",
@@ -30,6 +31,9 @@ of the shipped policies, which were chosen earlier, are of those seeds.
 
 FELT_TEST = range(7000, 7500)
 """Held out from everything that chose the policies of ``disturbed`` worlds, and what they meet."""
+
+REACTING_TEST = range(7500, 8000)
+"""Held out likewise, for a comparison that was added after :data:`FELT_TEST` had been jumped."""
 
 FELT_TUNING = range(11_000, 11_400)
 """Chose how the policies of ``disturbed`` worlds learn."""

@@ -9,10 +9,10 @@ import pytest
 from rich.console import Console
 
 from agents.options import TASK
-from experiments import ablations, arms, rivals
+from experiments import ablations, arms, reacting, rivals
 from experiments.arms import Arm, ArmsOptions, compare, felt_by_none, render, strongest
 from experiments.rivals import constant_shift
-from icub_jump_env.errors import PolicyFileError
+from icub_jump_env.errors import ConfigError, PolicyFileError
 from icub_jump_env.evaluation.episodes.contender import BASELINE
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.planning.lean import lean_correction
@@ -28,6 +28,8 @@ def small(monkeypatch):
     monkeypatch.setattr(arms, "RUNS", Path("kept"))
     monkeypatch.setattr(arms, "TUNED_ON", range(2))
     monkeypatch.setattr(arms, "FELT_TEST", range(3000, 3002))
+    monkeypatch.setattr(reacting, "REACTING_TEST", range(3000, 3002))
+    monkeypatch.setattr(reacting, "TUNING", range(4))
     monkeypatch.setattr(arms, "HIGHER", (0.0, 0.01))
     monkeypatch.setattr(rivals, "WITH_MOMENTUM", ((0.0,), (0.0,), (0.0, 0.5)))
     monkeypatch.setattr(rivals, "_COMMANDS", 2)
@@ -163,3 +165,25 @@ def test_gains_are_of_the_same_episodes_and_their_intervals_for_all_comparisons(
     alone = cells([theirs, theirs + gain])[-1][0]
     _, narrow_low, narrow_high = map(float, re.findall(r"[+-][\d.]+", alone))
     assert low < narrow_low < narrow_high < high
+
+
+def test_what_always_does_the_same_wins_nothing_by_reacting(small, capsys):
+    reacting.compare(reacting.ReactingOptions(episodes=2))
+    _, theirs, ours = rows(capsys.readouterr().out)
+    assert theirs[:2] == ["law and own mean action, +0.2 cm", "2"]
+    assert theirs[2::2] == [*ours[2::2]]
+    assert all(re.fullmatch(r"[+-](0\.0+) \([+-]\1 to [+-]\1\)", cell) for cell in theirs[3::2])
+
+
+def test_policies_are_compared_with_their_own_mean_actions(rng):
+    theirs = rng.normal(size=(2, 3, 40)) + np.array([0.0, 100.0])[:, None, None]
+    arm = Arm("one", CONFIG)
+    table = render([arm, arm], [theirs, theirs + 1.0], range(2), own=True)
+    assert next(iter(table.columns[-1].cells)) == "+1.00 (+1.00 to +1.00)"
+    table = render([arm, arm], [theirs, theirs + 1.0], range(2))
+    assert next(iter(table.columns[-1].cells)) != "+1.00 (+1.00 to +1.00)"
+
+
+def test_no_more_episodes_are_jumped_than_are_held_out():
+    with pytest.raises(ConfigError, match="episodes"):
+        reacting.ReactingOptions(episodes=501)

@@ -18,7 +18,7 @@ def test_tuning_selection_test_and_training_share_no_episode():
         for seed in segment_seeds(run, number, jobs)
     }
     held_out = (
-        seeds.TEST, seeds.FELT_TEST, seeds.PLANNER_TEST, seeds.FORESIGHT_TEST,
+        seeds.TEST, seeds.FELT_TEST, seeds.REACTING_TEST, seeds.PLANNER_TEST, seeds.FORESIGHT_TEST,
         *seeds.LANDING_TEST.values(),
     )  # fmt: skip
     uses = [
