@@ -194,6 +194,7 @@ class Layout:
         )
         n_present = sum(len(block.labels) for block in self._present)
         self._divisors = np.array(list(self.scales.values())[:n_present])
+        self._places = [(block.name, self.slices[block.name]) for block in self._present]
         places = np.arange(self.size)
         self._remembered = np.concatenate([places[self.slices[b.name]] for b in remembered])
         self._history = config.history
@@ -217,9 +218,10 @@ class Layout:
             (size,) entries of the observation space.
         """
         raw = np.empty(len(self._divisors))
-        for block in self._present:
-            raw[self.slices[block.name]] = values[block.name]
-        scaled = np.clip(raw / self._divisors, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
+        for name, place in self._places:
+            raw[place] = values[name]
+        raw /= self._divisors
+        scaled = np.minimum(np.maximum(raw, -OBSERVATION_LIMIT), OBSERVATION_LIMIT)
         present: NDArray[np.float32] = scaled.astype(np.float32)
         if not self._history:
             return present

@@ -135,8 +135,15 @@ class JumpRecorder:
     def metrics(self) -> JumpMetrics:
         """The metrics so far; of the flights, those of the highest one."""
         found = self.record.block[0].item()[: len(JumpMetrics.__slots__)]
-        values = dict(zip(JumpMetrics.__slots__, map(_plain, found), strict=True))
-        return JumpMetrics(**values | {"landed": bool(values["landed"])})
+        plain = [
+            (value if value == value else UNDEFINED)
+            if isinstance(value, float)
+            else tuple(map(_plain, value.tolist()))
+            for value in found
+        ]
+        values: dict[str, Any] = dict(zip(JumpMetrics.__slots__, plain, strict=True))
+        values["landed"] = bool(values["landed"])
+        return JumpMetrics(**values)
 
     @property
     def touchdown_time(self) -> float:
@@ -152,10 +159,8 @@ class JumpRecorder:
         self.record.landed = self.record.has_landed * self.record.only_feet
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if value == value else UNDEFINED
-    return tuple(map(_plain, value.tolist()))
+def _plain(value: float) -> float:
+    return value if value == value else UNDEFINED
 
 
 @compiled
