@@ -9,41 +9,19 @@ best policy alone, and compares it with all of them.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 
 from rich.console import Console
 
-from experiments.arms import LAW, OURS, Arm, asked_for_more, policies, render
+from experiments.arms import LAW, OURS, Arm, ArmsOptions, asked_for_more, policies, render
 from experiments.rivals import open_loop
 from experiments.seeds import REACTING_TEST, TUNING
 from experiments.shipped import best_of, judged_config
-from icub_jump_env.checks import check_count
-from icub_jump_env.control.config import ControllerName
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.report.output import show
 
 
-@dataclass(frozen=True)
-class ReactingOptions:
-    """Compare the policies with what they do in the mean.
-
-    Attributes:
-        controller: Controller of the launching phase.
-        episodes: Of each arm, at most 500.
-        jobs: Processes that work in parallel.
-    """
-
-    controller: ControllerName = "velocity"
-    episodes: int = len(REACTING_TEST)
-    jobs: int = 1
-
-    def __post_init__(self) -> None:
-        check_count("episodes", self.episodes, 2, len(REACTING_TEST))
-        check_count("jobs", self.jobs, 1, unit="processes")
-
-
-def compare(options: ReactingOptions) -> None:
+def compare(options: ArmsOptions) -> None:
     """Replay the policies, jump the held-out episodes, and print."""
     console, progress = Console(), Console(stderr=True)
     trained = policies(f"disturbed-{options.controller}")
@@ -68,4 +46,4 @@ def compare(options: ReactingOptions) -> None:
 
 
 if __name__ == "__main__":
-    guarded(lambda: compare(parse(ReactingOptions, sys.argv[1:])))
+    guarded(lambda: compare(parse(ArmsOptions, sys.argv[1:])))

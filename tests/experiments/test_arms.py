@@ -168,7 +168,7 @@ def test_gains_are_of_the_same_episodes_and_their_intervals_for_all_comparisons(
 
 
 def test_what_always_does_the_same_wins_nothing_by_reacting(small, capsys):
-    reacting.compare(reacting.ReactingOptions(episodes=2))
+    reacting.compare(ArmsOptions(episodes=2))
     _, theirs, ours = rows(capsys.readouterr().out)
     assert theirs[:2] == ["law and own mean action, +0.2 cm", "2"]
     assert theirs[2::2] == [*ours[2::2]]
@@ -186,4 +186,4 @@ def test_policies_are_compared_with_their_own_mean_actions(rng):
 
 def test_no_more_episodes_are_jumped_than_are_held_out():
     with pytest.raises(ConfigError, match="episodes"):
-        reacting.ReactingOptions(episodes=501)
+        ArmsOptions(episodes=501)
