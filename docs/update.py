@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
     parser.add_argument("--only", default="", help="run the commands that contain these words")
     only = parser.parse_args(arguments).only
-    for file in (REPOSITORY / "README.md", *sorted(DOCS.glob("*.md"))):
+    for file in (REPOSITORY / "README.md", *sorted(DOCS.rglob("*.md"))):
         for block in BLOCK.finditer(file.read_text()):
             if only not in block["command"]:
                 continue

@@ -129,7 +129,9 @@ def remake(options: EvidenceOptions) -> None:
         shipped = _ship(controller, TEST, options.jobs, console)
         _make_rivals(controller, shipped, options.jobs, console)
         _ship(f"disturbed-{controller}", FELT_TEST, options.jobs, console)
-    learning_curves(RUNS).savefig(REPOSITORY / "docs" / "images" / "learning.png")
+    images = REPOSITORY / "docs" / "images"
+    learning_curves(RUNS).savefig(images / "learning.png")
+    learning_curves(RUNS, "disturbed-").savefig(images / "learning_disturbed.png")
     _run("docs/update.py")
 
 

@@ -112,16 +112,17 @@ def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
     return figure
 
 
-def learning_curves(folder: Path) -> Figure:
+def learning_curves(folder: Path, task: str = "") -> Figure:
     """Each seed's evaluations as a thin line, their interquartile mean as a thick one.
 
     Args:
         folder: Holds the curves of the runs.
+        task: What their names begin with before the controller: ``"disturbed-"``.
     """
     runs = {
         controller: [
             json.loads(file.read_text())["evaluations"]
-            for file in sorted(folder.glob(f"{controller}-seed*{CURVE_SUFFIX}"))
+            for file in sorted(folder.glob(f"{task}{controller}-seed*{CURVE_SUFFIX}"))
         ]
         for controller in CONTROLLERS
     }
@@ -141,7 +142,7 @@ def learning_curves(folder: Path) -> Figure:
             mean = interquartile_mean(values, axis=0)
             axis.plot(steps, mean, color=color, lw=2.0, label=f"{controller}, {len(curves)} seeds")
         axis.set(xlabel="steps (thousand)", ylabel=label)
-    left.legend(frameon=False, loc="lower right")
+    left.legend(frameon=False)
     return figure
 
 

@@ -17,14 +17,14 @@ from icub_jump_env.simulation import tables
 from icub_jump_env.simulation.actuators.servo import ServoGains
 
 REPOSITORY = Path(__file__).parents[1]
-DOCUMENTS = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+DOCUMENTS = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 
 spec = importlib.util.spec_from_file_location("update", REPOSITORY / "docs" / "update.py")
 update = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(update)
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: str(d.relative_to(REPOSITORY)))
 def test_regenerating_changes_only_the_blocks(document):
     text = document.read_text()
 
@@ -93,7 +93,7 @@ def test_nothing_advises_to_install_the_package_from_an_index():
         assert not re.search(r"pip install [^\n`]*icub-jump\b(?!-)", file.read_text()), file
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: str(d.relative_to(REPOSITORY)))
 def test_every_command_of_eval_parses(document):
     text = document.read_text().replace("\\\n", " ")  # a command may go on in the next line
     for line in re.findall(r"python eval\.py([^#`\n]*)", text):
@@ -108,7 +108,7 @@ def anchors(document):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: str(d.relative_to(REPOSITORY)))
 def test_links_lead_somewhere(document):
     for link in re.findall(r"\]\(([^)\s]+)\)", document.read_text()):
         name, _, anchor = link.partition("#")

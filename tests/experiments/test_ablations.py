@@ -138,3 +138,9 @@ def test_curves_show_every_seed_and_their_mean_as_far_as_all_go(runs):
     np.testing.assert_allclose(mean.get_ydata(), values.mean(axis=0))  # they are symmetric
     assert mean.get_label() == "velocity, 5 seeds"
     assert rise.lines[4].get_ydata().tolist() == pytest.approx([4.4, 4.4])
+
+
+def test_curves_of_a_task_are_its_own(runs):
+    (runs / "disturbed-velocity-seed7.curve.json").write_text(json.dumps(curve(0.0, points=4)))
+    success, _ = learning_curves(runs, "disturbed-").axes
+    assert [len(line.get_xdata()) for line in success.lines] == [4, 4]  # the seed and the mean

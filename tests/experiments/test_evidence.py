@@ -68,7 +68,7 @@ def test_everything_is_made_and_nothing_twice(calls):
     assert [words[0] for words in calls] == ["train.py"] * 6 + ["docs/update.py"]
     plan = load_policy(RUNS / "disturbed-velocity-plan-seed0.safetensors").card
     assert len(plan.inputs) == len(TrainOptions(inputs="command").input_names)
-    assert Path("docs/images/learning.png").exists()
+    assert all(Path("docs/images", f"learning{task}.png").exists() for task in ("", "_disturbed"))
     candidates = [RUNS / f"velocity-seed{seed}.safetensors" for seed in (0, 1)]
     best = load_policy(max(candidates, key=score))
     shipped = load_policy(SHIPPED / "velocity.safetensors")
