@@ -1,11 +1,13 @@
 """Conversions between MuJoCo's and Pinocchio's coordinates of the floating base.
 
-|              | MuJoCo free joint           | Pinocchio free-flyer        |
-|--------------|-----------------------------|-----------------------------|
-| position     | world                       | world                       |
-| orientation  | quaternion wxyz             | quaternion xyzw             |
-| linear vel.  | of the base origin, world   | of the base origin, base    |
-| angular vel. | base                        | base                        |
+============  =========================  ========================
+of the base   MuJoCo free joint          Pinocchio free-flyer
+============  =========================  ========================
+position      world                      world
+orientation   quaternion wxyz            quaternion xyzw
+linear vel.   of the base origin, world  of the base origin, base
+angular vel.  base                       base
+============  =========================  ========================
 """
 
 from __future__ import annotations
