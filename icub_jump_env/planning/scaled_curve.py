@@ -271,9 +271,9 @@ class ScaledCurvePlanner:
     def __init__(
         self,
         kinematics: FeetFixedKinematics,
-        com_displacement: float | None,
-        com_scaling: ComScaling,
-        ballistic: bool,
+        com_displacement: float | None = None,
+        com_scaling: ComScaling = "displacement",
+        ballistic: bool = False,
     ) -> None:
         """Set up the planner; arguments of :func:`plan_com_trajectory` and the plan.
 
