@@ -12,7 +12,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast, get_args
 
 import tyro
 from rich.console import Console
@@ -23,6 +23,9 @@ from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.files import read_json
 from icub_jump_env.simulation.opengl import import_mujoco
 from icub_jump_env.versions import VERSIONS, EnvName
+
+if TYPE_CHECKING:
+    from icub_jump_env.evaluation.episodes.contender import Contender
 
 T = TypeVar("T")
 
@@ -122,10 +125,39 @@ def evaluate(arguments: Sequence[str]) -> None:
     guarded(lambda: _evaluate(arguments))
 
 
-def _evaluate(arguments: Sequence[str]) -> None:
-    options = parse(EvalOptions, arguments, _defaults(arguments))
-    import_mujoco()
+def read_options(arguments: Sequence[str]) -> EvalOptions:
+    """What a command line asks for.
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+    return parse(EvalOptions, arguments, _defaults(arguments))
+
+
+def contenders_of(options: EvalOptions) -> list[Contender]:
+    """The policies that shall act, or the baseline.
+
+    Raises:
+        ICubJumpError: If one cannot be read, or was made for another environment.
+    """
     # Imported here, like the modes, so that --help and bad arguments answer at once.
+    from icub_jump_env.evaluation.episodes.contender import read_contenders
+    from icub_jump_env.policy import check_match
+
+    words = options.compare or (options.policy or "baseline",)
+    contenders = read_contenders([str(word) for word in words])
+    for contender in contenders:
+        if contender.card is not None:
+            try:
+                check_match(contender.card, options.config)
+            except PolicyMismatchError as error:
+                raise ICubJumpError(f"{contender.name}: {error}") from error
+    return contenders
+
+
+def _evaluate(arguments: Sequence[str]) -> None:
+    options = read_options(arguments)
+    import_mujoco()
     from icub_jump_env.evaluation.report.output import check_writable, say
 
     for name in ("json", "video", "results"):
@@ -140,17 +172,8 @@ def _evaluate(arguments: Sequence[str]) -> None:
         check_video(options.video)
 
     from icub_jump_env.evaluation.episodes.cluster import Cluster
-    from icub_jump_env.evaluation.episodes.contender import read_contenders
-    from icub_jump_env.policy import check_match
 
-    words = options.compare or (options.policy or "baseline",)
-    contenders = read_contenders([str(word) for word in words])
-    for contender in contenders:
-        if contender.card is not None:
-            try:
-                check_match(contender.card, options.config)
-            except PolicyMismatchError as error:
-                raise ICubJumpError(f"{contender.name}: {error}") from error
+    contenders = contenders_of(options)
     if isinstance(options.workers, Cluster):
         options.workers.connect()  # before any file is touched
     console, progress = Console(), Console(stderr=True)

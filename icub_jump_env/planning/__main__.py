@@ -12,6 +12,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,5 +79,10 @@ def make_plans(options: PlanningOptions) -> None:
     )
 
 
+def run(arguments: Sequence[str]) -> None:
+    """Run the command with these arguments."""
+    guarded(lambda: make_plans(parse(PlanningOptions, arguments)))
+
+
 if __name__ == "__main__":
-    guarded(lambda: make_plans(parse(PlanningOptions, sys.argv[1:])))
+    run(sys.argv[1:])

@@ -1,0 +1,1 @@
+"""Policies, plans and jumps in formats that other programs read."""

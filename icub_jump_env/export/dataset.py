@@ -1,0 +1,58 @@
+"""Episodes as a Minari dataset, for offline learning."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import gymnasium
+
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import MissingDependencyError
+from icub_jump_env.policy import Policy
+from icub_jump_env.versions import ENV_ID
+
+
+def write_dataset(
+    name: str, config: JumpConfig, policy: Policy, seeds: Sequence[int], algorithm: str
+) -> Path:
+    """Record episodes into Minari's folder (``MINARI_DATASETS_PATH``).
+
+    Args:
+        name: As Minari's names are: ``icub/jump/baseline-v0``.
+        config: The jump.
+        policy: What acts.
+        seeds: One for each episode.
+        algorithm: What the dataset says that acts.
+
+    Returns:
+        Its folder.
+
+    Raises:
+        MissingDependencyError: Without the package ``minari``.
+        ValueError: If there is one of that name, or Minari refuses the name.
+    """
+    try:
+        import h5py  # noqa: F401 (Minari writes with it)
+        import minari
+        from minari.data_collector import EpisodeBuffer
+    except ImportError:
+        raise MissingDependencyError("a dataset needs the extra 'export'") from None
+    env = gymnasium.make(ENV_ID, **dataclasses.asdict(config))
+    episodes = []
+    for seed in seeds:
+        observation, _ = env.reset(seed=seed)
+        episode = EpisodeBuffer(seed=seed, observations=[observation], actions=[])
+        while not (episode.terminations and episode.terminations[-1]):
+            action = policy(observation)
+            observation, reward, terminated, truncated, _ = env.step(action)
+            episode.observations.append(observation)
+            episode.actions.append(action)
+            episode.rewards.append(reward)
+            episode.terminations.append(terminated)
+            episode.truncations.append(truncated)
+        episodes.append(episode)
+    env.close()
+    dataset = minari.create_dataset_from_buffers(name, episodes, env, algorithm_name=algorithm)
+    return Path(dataset.storage.data_path)
