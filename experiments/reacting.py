@@ -12,7 +12,7 @@ import sys
 
 from rich.console import Console
 
-from experiments.arms import LAW, OURS, Arm, ArmsOptions, asked_for_more, policies, render
+from experiments.arms import LAW, MORE, OURS, Arm, ArmsOptions, asked_for_more, policies, render
 from experiments.rivals import open_loop
 from experiments.seeds import REACTING_TEST, TUNING
 from experiments.shipped import best_of, judged_config
@@ -31,7 +31,7 @@ def compare(options: ArmsOptions) -> None:
         for each in trained
     ]
     arms = [
-        asked_for_more(arm)
+        asked_for_more(arm, MORE[options.controller])
         for arm in (
             Arm(LAW, law),
             Arm("law and own mean action", law, replays),

@@ -84,6 +84,14 @@ def test_every_arm_jumps_the_held_out_episodes_of_its_own_configuration(small, c
     assert by_name["policy on the law, +0.2 cm"][4] == rise(asked, *ours)
 
 
+def test_without_more_height_each_arm_is_there_once_and_the_policies_last(small, monkeypatch):
+    monkeypatch.setattr(arms, "MORE", {"velocity": 0.0})
+    names = [arm.name for arm in arms.arms("velocity", 1, CONSOLE)]
+    assert len(set(names)) == len(names)
+    assert (names.count("lean felt: the law"), names[-1]) == (1, "policy on the law")
+    assert not any("+0 cm" in name for name in names)
+
+
 def test_trainings_that_are_missing_are_named(small):
     with pytest.raises(PolicyFileError, match=r"disturbed-torque-seed\*"):
         compare(ArmsOptions(controller="torque", episodes=2))
