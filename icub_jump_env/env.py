@@ -260,7 +260,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def snapshot(self) -> Snapshot:
         """True state, reference and command at the present instant, for logs and figures."""
         truth, drives = self._simulation.truth.read(), self._simulation.actuators.drives
-        controller, reference = self._controller, np.full(3, np.nan)
+        controller, readings = self._controller, self._simulation.sensors.readings
+        reference = np.full(3, np.nan)
         if controller.launching:
             reference = controller.reference.setpoint.com_position
         return Snapshot(
@@ -268,6 +269,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             phase=controller.phases.phase.name.lower(),
             joint_position=truth.joint_position.copy(),
             joint_velocity=truth.joint_velocity.copy(),
+            encoder_position=readings.joint_position.copy(),
+            encoder_velocity=readings.joint_velocity.copy(),
             joint_velocity_command=drives.velocity_command.copy(),
             joint_torque=truth.joint_torque.copy(),
             joint_torque_command=drives.torque_command.copy(),

@@ -19,6 +19,9 @@ class Snapshot:
         phase: ``launch``, ``flight`` or ``landing``.
         joint_position: (23,) rad.
         joint_velocity: (23,) rad/s.
+        encoder_position: (23,) what the encoders say, which is what the controllers know (rad). The
+            true values are those at the beginning of the last physics step, these at its end.
+        encoder_velocity: (23,) rad/s.
         joint_velocity_command: (23,) latest command to the servos (rad/s).
         joint_torque: (23,) Nm.
         joint_torque_command: (23,) latest torque command (Nm); NaN in other modes than
@@ -37,6 +40,8 @@ class Snapshot:
     phase: str
     joint_position: Array
     joint_velocity: Array
+    encoder_position: Array
+    encoder_velocity: Array
     joint_velocity_command: Array
     joint_torque: Array
     joint_torque_command: Array

@@ -28,13 +28,16 @@ def test_help_names_the_commands(icub_jump, words):
     code, out, err = icub_jump(*words)
     assert (code, err) == (0, "")
     assert [line.split()[:2] for line in out.splitlines()] == [
-        ["icub-jump", "eval"],
-        ["icub-jump", "train"],
+        ["icub-jump", name] for name in ("eval", "view", "train", "plan", "export")
     ]
 
 
 def test_another_command_is_refused_in_one_line(icub_jump):
-    assert icub_jump("fly", "--help") == (2, "", "error: 'fly' is none of eval, train\n")
+    assert icub_jump("fly", "--help") == (
+        2,
+        "",
+        "error: 'fly' is none of eval, view, train, plan, export\n",
+    )
 
 
 @pytest.mark.parametrize(
@@ -42,6 +45,9 @@ def test_another_command_is_refused_in_one_line(icub_jump):
     [
         ("eval", ("--jump-height", "--compare", "--study")),
         ("train", ("--jump-height", "--ppo.log-std", "--timesteps")),
+        ("view", ("--jump-height", "--camera")),
+        ("plan", ("--robot", "--output")),
+        ("export", ("policy", "dataset")),
     ],
 )
 def test_each_command_has_its_help(icub_jump, command, flags):

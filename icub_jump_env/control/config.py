@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from icub_jump_env.checks import (
     store,
 )
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.robot.kinematics import FeetFixedKinematics
+
+if TYPE_CHECKING:
+    from icub_jump_env.control.launch import TrackingController
 
 ControllerName = Literal["velocity", "torque"]
 SolverName = Literal["daqp", "osqp"]
@@ -120,6 +124,14 @@ class ControllerConfig:
         store(self, momentum_control=check_flag("momentum_control", self.momentum_control))
         check_type("phases", self.phases, PhaseConfig)
 
+    def make(self, kinematics: FeetFixedKinematics) -> TrackingController:
+        """The controller of the launching phase. A class of one's own makes one of one's own.
+
+        Args:
+            kinematics: The model, which the estimator keeps up to date.
+        """
+        raise NotImplementedError
+
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityConfig(ControllerConfig):
@@ -170,6 +182,12 @@ class VelocityConfig(ControllerConfig):
         )
         # One of the two must be positive, or the QP has no unique solution.
         _store_weights(self, posture_weight=(1e-6, 1e6), smoothness_weight=(0.0, 1e6))
+
+    def make(self, kinematics: FeetFixedKinematics) -> TrackingController:
+        """Eq. 3; see :meth:`ControllerConfig.make`."""
+        from icub_jump_env.control.velocity import VelocityController
+
+        return VelocityController(self, kinematics)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,6 +251,12 @@ class TorqueConfig(ControllerConfig):
         )
         _store_weights(self, posture_weight=(1e-6, 1e6), smoothness_weight=(0.0, 1e6))
         check_type("contact", self.contact, ContactConfig)
+
+    def make(self, kinematics: FeetFixedKinematics) -> TrackingController:
+        """Eq. 6; see :meth:`ControllerConfig.make`."""
+        from icub_jump_env.control.torque import TorqueController
+
+        return TorqueController(self, kinematics)
 
 
 def _store_numbers(config: Any, **ranges: tuple[float, float, str]) -> None:

@@ -7,13 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from icub_jump_env.control.config import FlightName, LandingName, TorqueConfig, VelocityConfig
+from icub_jump_env.control.config import ControllerConfig, FlightName, LandingName
 from icub_jump_env.control.flight import FeedbackFlight, Flight, MinimumJerkFlight
 from icub_jump_env.control.landing import CROUCH_TIME, FeedbackLanding, HoldLanding, Landing
-from icub_jump_env.control.launch import Launch, TrackingController
+from icub_jump_env.control.launch import Launch
 from icub_jump_env.control.phases import Phase, PhaseController, PhaseMachine, Tick
-from icub_jump_env.control.torque import TorqueController
-from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.state import RobotState
 from icub_jump_env.planning.lean import lean_correction
 from icub_jump_env.planning.plan import JumpPlan
@@ -42,7 +40,7 @@ class JumpController:
 
     def __init__(
         self,
-        config: VelocityConfig | TorqueConfig,
+        config: ControllerConfig,
         residual: ResidualConfig,
         kinematics: FeetFixedKinematics,
         lean_correction: bool = False,
@@ -73,11 +71,6 @@ class JumpController:
         shift = None
         if self._in_all_phases:
             shift = kinematics.com_shift(kinematics.robot.landing)
-        tracking: TrackingController
-        if isinstance(config, TorqueConfig):
-            tracking = TorqueController(config, kinematics)
-        else:
-            tracking = VelocityController(config, kinematics)
         flight: Flight
         if flight_name == "feedback":
             flight = FeedbackFlight(self.residual, dt, kinematics)
@@ -92,7 +85,7 @@ class JumpController:
         self._none_on_the_ground = flight_name == "feedback" and landing_name == "hold"
         self._landing = landing
         self._controllers: dict[Phase, PhaseController] = {
-            Phase.LAUNCH: Launch(tracking, self.reference, dt),
+            Phase.LAUNCH: Launch(config.make(kinematics), self.reference, dt),
             Phase.FLIGHT: flight,
             Phase.LANDING: landing,
         }

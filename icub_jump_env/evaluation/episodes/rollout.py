@@ -61,7 +61,7 @@ class Episode:
 
 def make_env(config: JumpConfig) -> ICubJumpEnv:
     """The environment of a configuration, without wrappers."""
-    return ICubJumpEnv(**dataclasses.asdict(config))
+    return ICubJumpEnv(**vars(config))
 
 
 def traced(config: JumpConfig) -> JumpConfig:
