@@ -13,10 +13,9 @@ neighbour of the same axis succeeds, too, so that luck alone does not.
 from __future__ import annotations
 
 import itertools
-import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -26,6 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.seeds import TUNING
+from icub_jump_env.benchmark.worlds import WORLDS
 from icub_jump_env.checks import check_choice, check_count
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.control.config import ControllerName
@@ -38,50 +38,19 @@ from icub_jump_env.observation import DEFAULT
 from icub_jump_env.planning.lean import lean_of
 from icub_jump_env.planning.residual import AXES
 from icub_jump_env.simulation.disturbances import PUSH_DURATION
-from icub_jump_env.simulation.randomization import RANDOMIZATIONS
 from icub_jump_env.versions import VERSIONS, EnvName
 
 Array = NDArray[np.float32]
 Success = NDArray[np.bool_]
-
-HARD, DEG = RANDOMIZATIONS["hard"], math.radians(1.0)
 
 REGIMES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "full": {"randomization": "full"},
         "hard": {"randomization": "hard"},
         "disturbed": {"randomization": "disturbed"},
-        "pushed": {
-            "randomization": replace(
-                HARD,
-                push=(-6.0, 6.0),
-                flight_push=(-6.0, 6.0),
-                landing_push=(-8.0, 8.0),
-                landing_push_time=(0.1, 0.8),
-            ),
-            "residual_phases": "all",
-        },
-        "lateral": {
-            "randomization": replace(
-                HARD,
-                lateral_slope=(-3.0 * DEG, 3.0 * DEG),
-                push=(-6.0, 6.0),
-                push_direction=(math.pi / 2, math.pi / 2),
-                landing_push=(-8.0, 8.0),
-                landing_push_direction=(math.pi / 2, math.pi / 2),
-            ),
-            "residual_phases": "all",
-        },
-        "landing": {
-            "randomization": replace(
-                HARD,
-                takeoff_spin=(-0.2, 0.2),
-                floor_tilt=(-5.0 * DEG, 5.0 * DEG),
-                floor_tilt_lateral=(-3.0 * DEG, 3.0 * DEG),
-                edge=(-0.02, 0.02),
-                step=(0.0, 0.02),
-            ),
-            "residual_phases": "all",
+        **{
+            name: {"randomization": world, "residual_phases": "all"}
+            for name, world in WORLDS.items()
         },
         "5 jumps": {"randomization": "hard", "jumps": 5, "residual_phases": "all"},
     }

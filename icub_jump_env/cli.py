@@ -12,6 +12,7 @@ icub-jump eval ...     evaluate the jump; icub-jump eval --help
 icub-jump view ...     show it live: the same options
 icub-jump train ...    train a residual on the reference; icub-jump train --help
 icub-jump plan ...     make whole-body plans; icub-jump plan --help
+icub-jump bench ...    the jump benchmark; icub-jump bench --help
 icub-jump export ...   policies, plans and jumps for other programs; icub-jump export --help\
 """
 
@@ -45,11 +46,18 @@ def _export(arguments: Sequence[str]) -> None:
     export(arguments)
 
 
+def _bench(arguments: Sequence[str]) -> None:
+    from icub_jump_env.benchmark.cli import bench
+
+    bench(arguments)
+
+
 _COMMANDS: dict[str, Callable[[Sequence[str]], None]] = {
     "eval": _eval,
     "view": _view,
     "train": _train,
     "plan": _plan,
+    "bench": _bench,
     "export": _export,
 }
 

@@ -28,7 +28,7 @@ def test_help_names_the_commands(icub_jump, words):
     code, out, err = icub_jump(*words)
     assert (code, err) == (0, "")
     assert [line.split()[:2] for line in out.splitlines()] == [
-        ["icub-jump", name] for name in ("eval", "view", "train", "plan", "export")
+        ["icub-jump", name] for name in ("eval", "view", "train", "plan", "bench", "export")
     ]
 
 
@@ -36,7 +36,7 @@ def test_another_command_is_refused_in_one_line(icub_jump):
     assert icub_jump("fly", "--help") == (
         2,
         "",
-        "error: 'fly' is none of eval, view, train, plan, export\n",
+        "error: 'fly' is none of eval, view, train, plan, bench, export\n",
     )
 
 
@@ -47,6 +47,7 @@ def test_another_command_is_refused_in_one_line(icub_jump):
         ("train", ("--jump-height", "--ppo.log-std", "--timesteps")),
         ("view", ("--jump-height", "--camera")),
         ("plan", ("--robot", "--output")),
+        ("bench", ("FILE.json", "--table")),
         ("export", ("policy", "dataset")),
     ],
 )

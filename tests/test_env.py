@@ -124,7 +124,7 @@ def test_info_of_every_step(env):
             "flight_height", "apex_height", "sole_height", "flight_rotation",
             "base_pitch_range", "angular_momentum_takeoff", "peak_ground_force", "landed",
             "solver_failures", "limit_violations", "landing_force", "joint_work",
-            "self_collisions",
+            "self_collisions", "still_time",
         }  # fmt: skip
 
 

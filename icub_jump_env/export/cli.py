@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from icub_jump_env.errors import InvalidValueError
@@ -41,24 +41,20 @@ def _export(kind: str, *words: str) -> None:
     places_given, options = words[: len(places)], words[len(places) :]
     if len(places_given) < len(places) or any(word.startswith("-") for word in places_given):
         raise InvalidValueError(kind, " ".join(words), f"{' and '.join(places)} before options")
-    if kind == "policy":
-        written = _policy(*places_given, *options)
-    else:
-        written = {"plan": _plan, "jump": _jump, "dataset": _dataset}[kind](*places_given, options)
-    print(f"wrote {written}", file=sys.stderr)
+    print(f"wrote {_WRITERS[kind](*places_given, words=options)}", file=sys.stderr)
 
 
-def _policy(name: str, file: str, *more: str) -> Path:
+def _policy(name: str, file: str, *, words: Sequence[str]) -> Path:
     from icub_jump_env.export.onnx_policy import write_onnx
     from icub_jump_env.policy import load_policy
 
-    if more:
-        raise InvalidValueError("policy", more[0], "no options")
+    if words:
+        raise InvalidValueError("policy", words[0], "no options")
     write_onnx(load_policy(name), Path(file))
     return Path(file)
 
 
-def _plan(file: str, words: Sequence[str]) -> Path:
+def _plan(file: str, *, words: Sequence[str]) -> Path:
     from icub_jump_env.evaluation.episodes.rollout import planned
     from icub_jump_env.export.tables import write_plan
 
@@ -68,7 +64,7 @@ def _plan(file: str, words: Sequence[str]) -> Path:
     return Path(file)
 
 
-def _jump(file: str, words: Sequence[str]) -> Path:
+def _jump(file: str, *, words: Sequence[str]) -> Path:
     from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
     from icub_jump_env.export.tables import write_jump
 
@@ -82,9 +78,17 @@ def _jump(file: str, words: Sequence[str]) -> Path:
     return Path(file)
 
 
-def _dataset(name: str, words: Sequence[str]) -> Path:
+def _dataset(name: str, *, words: Sequence[str]) -> Path:
     from icub_jump_env.export.dataset import write_dataset
 
     options = read_options(words)
     (contender,) = contenders_of(options)
     return write_dataset(name, options.config, contender.policy, options.seeds, contender.name)
+
+
+_WRITERS: dict[str, Callable[..., Path]] = {
+    "policy": _policy,
+    "plan": _plan,
+    "jump": _jump,
+    "dataset": _dataset,
+}

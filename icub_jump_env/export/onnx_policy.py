@@ -76,8 +76,8 @@ def _graph(network: NetworkPolicy, helper: Any) -> Any:
     entries, action_axes = network.entries, network.action_axes
     constants: dict[str, NDArray[Any]] = {
         "columns": np.array([entries.index(name) for name in network.inputs], np.int64),
-        "least": np.float32(-1.0),
-        "largest": np.float32(1.0),
+        "least": np.array(-1.0, np.float32),
+        "largest": np.array(1.0, np.float32),
         "axes": np.zeros((len(network.axes), len(action_axes)), np.float32),
     }
     for row, axis in enumerate(network.axes):

@@ -92,6 +92,7 @@ class JumpMetrics:
             beyond its torque or position limit.
         self_collisions: Control ticks, but no more than 100 a second, at which links were in
             each other; neighbours at a joint do not count.
+        still_time: How long the CoM has been slower than 0.05 m/s at the end (s).
     """
 
     takeoff_time: float = UNDEFINED
@@ -113,6 +114,7 @@ class JumpMetrics:
     solver_failures: float = 0.0
     limit_violations: float = 0.0
     self_collisions: float = 0.0
+    still_time: float = 0.0
 
     def is_success(self, jump_height: float, success: SuccessConfig) -> bool:
         """Whether the jump to a commanded height (m) landed, high and long enough."""

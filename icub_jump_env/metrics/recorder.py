@@ -21,13 +21,15 @@ POSITION_TOLERANCE = 1e-3
 """A joint violates its position limit beyond this (rad): MuJoCo's limits are slightly soft."""
 CHATTER_TIME = 0.02
 """A shorter loss of ground contact is no flight (s)."""
+STILL_SPEED = 0.05
+"""The robot is still while its CoM is slower than this (m/s)."""
 
 
 class JumpRecord(Record):
     """The metrics of a jump so far, and what they are made of; flags are 0 or 1.
 
     Attributes:
-        takeoff_time, and all until self_collisions: As in
+        takeoff_time, and all until still_time: As in
             :class:`icub_jump_env.metrics.jump.JumpMetrics`.
         start: When the jump began (s of the episode).
         rest: How long the robot has to stand after touch-down (s).
@@ -70,6 +72,7 @@ class JumpRecord(Record):
     solver_failures: Number
     limit_violations: Number
     self_collisions: Number
+    still_time: Number
     start: Number
     rest: Number
     last_time: Number
@@ -172,7 +175,7 @@ def begin(start: float, rest: float, record: Block) -> None:
     r.apex_height = r.sole_height = r.flight_rotation = r.base_pitch_range = math.nan
     r.angular_momentum_takeoff[:] = math.nan
     r.peak_ground_force = r.joint_work = r.sole_slip = r.landed = 0.0
-    r.solver_failures = r.limit_violations = r.self_collisions = 0.0
+    r.solver_failures = r.limit_violations = r.self_collisions = r.still_time = 0.0
     r.chest_lean[:] = 0.0
     r.start, r.rest = start, rest
     r.landing_force = r.last_time = r.touchdown_time = math.nan
@@ -204,6 +207,9 @@ def watch(state: Block, limits: Block, record: Block) -> None:
     r.peak_ground_force = max(r.peak_ground_force, force)
     r.only_feet = r.only_feet * s.only_feet_touch
     watch_joints(s, dt, bounds, r)
+    v = s.com_velocity
+    slow = v[0] ** 2 + v[1] ** 2 + v[2] ** 2 < STILL_SPEED**2
+    r.still_time = r.still_time + dt if slow else 0.0
 
     x, y, z = s.chest_up[0], s.chest_up[1], s.chest_up[2]
     upright = math.acos(min(1.0, max(-1.0, z))) < LANDED_TILT
