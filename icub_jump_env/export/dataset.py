@@ -55,5 +55,15 @@ def write_dataset(
             episode.truncations.append(truncated)
         episodes.append(episode)
     env.close()
-    dataset = minari.create_dataset_from_buffers(name, episodes, env, algorithm_name=algorithm)
+    with warnings.catch_warnings():
+        # Who publishes a dataset knows author and code; they can be added then.
+        warnings.filterwarnings("ignore", "`(code_permalink|author|author_email)` is set to None")
+        dataset = minari.create_dataset_from_buffers(
+            name,
+            episodes,
+            env,
+            eval_env=env,
+            algorithm_name=algorithm,
+            description=f"Jumps of the iCub: {config.controller_name} controller, {algorithm}",
+        )
     return Path(dataset.storage.data_path)
