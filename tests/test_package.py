@@ -15,7 +15,9 @@ PACKAGE = REPOSITORY / "icub_jump_env"
 
 # Each layer may import itself and the layers after it.
 LAYERS = (
-    ("evaluation", "cli"),
+    ("cli",),
+    ("benchmark", "export"),
+    ("evaluation",),
     ("vector",),
     ("env",),
     ("policy",),

@@ -45,10 +45,11 @@ def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
 
 @functools.cache
 def source() -> str:
-    """Hash of the code that a jump depends on: the package without the evaluation."""
+    """Hash of the code that a jump depends on: the package without what judges or exports it."""
     package = Path(icub_jump_env.__file__).parent
+    others = {package / name for name in ("benchmark", "evaluation", "export")}
     files = sorted(package.rglob("*.py"))
-    return _hash(package, [file for file in files if package / "evaluation" not in file.parents])
+    return _hash(package, [file for file in files if others.isdisjoint(file.parents)])
 
 
 @functools.cache
