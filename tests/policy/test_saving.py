@@ -214,6 +214,7 @@ KINDS = {"": "network", "-constant": "network", "-open-loop": "replay"}
 
 def test_the_shipped_policies_are_those_of_both_controllers():
     assert shipped_policies() == [
+        "disturbed-torque",
         "disturbed-velocity",
         *(f"{controller}{kind}" for controller in ("torque", "velocity") for kind in KINDS),
     ]
