@@ -1,4 +1,4 @@
-"""The documentation site: ``sphinx-build --fail-on-warning docs site``."""
+"""The documentation site: ``python -m sphinx -W docs site``."""
 
 import re
 from importlib import metadata

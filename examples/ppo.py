@@ -2,8 +2,8 @@
 
     python examples/ppo.py --steps 150000 --seed 0
 
-writes the best policy to runs/ppo/policy.safetensors, for `python eval.py --policy ...`. What it lacks
-beside train.py: noise that lasts, a critic that sees the world, checkpoints, evaluation on fixed seeds.
+writes the trained policy to runs/ppo/policy.safetensors, for `python eval.py --policy ...`. What it lacks
+beside train.py: noise that lasts, a critic that sees the world, checkpoints, evaluations that choose the best policy.
 
 Schulman et al., Proximal Policy Optimization Algorithms, 2017; advantages by Schulman et al., High-Dimensional
 Continuous Control Using Generalized Advantage Estimation, 2015.

@@ -50,6 +50,8 @@ The velocity controller was changed after both had been judged on the seeds of t
 of which no bit changed.
 """
 
+# Seeds from 20000 to 20999 are the jump benchmark's: icub_jump_env/benchmark/cases.py.
+
 FORESIGHT_TEST = range(5425, 5550)
 """Held out from everything that chose when an episode may end early.
 

@@ -13,7 +13,8 @@ icub-jump view ...     show it live: the same options
 icub-jump train ...    train a residual on the reference; icub-jump train --help
 icub-jump plan ...     make whole-body plans; icub-jump plan --help
 icub-jump bench ...    the jump benchmark; icub-jump bench --help
-icub-jump export ...   policies, plans and jumps for other programs; icub-jump export --help\
+icub-jump export ...   policies, plans and jumps for other programs; icub-jump export --help
+icub-jump --version    versions of all that a jump depends on\
 """
 
 
@@ -67,6 +68,11 @@ def main() -> None:
     name, *arguments = sys.argv[1:] or ["--help"]
     if name in ("-h", "--help"):
         print(_USAGE)
+        return
+    if name == "--version":
+        from icub_jump_env.evaluation.report.provenance import versions
+
+        print(*(f"{package} {version}" for package, version in versions().items()), sep="\n")
         return
     if name not in _COMMANDS:
         print(f"error: {name!r} is none of {', '.join(_COMMANDS)}", file=sys.stderr)

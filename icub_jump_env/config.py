@@ -223,7 +223,7 @@ class JumpConfig(WithShortcuts):
 
     def _check_groups(self) -> None:
         for name, presets, kind in (
-            ("controller", CONTROLLERS, ControllerConfig),
+            ("controller", CONTROLLERS, (VelocityConfig, TorqueConfig)),
             ("actuators", ACTUATORS, ActuatorConfig),
             ("sensors", SENSORS, SensorConfig),
             ("randomization", RANDOMIZATIONS, Randomization),

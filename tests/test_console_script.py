@@ -28,7 +28,8 @@ def test_help_names_the_commands(icub_jump, words):
     code, out, err = icub_jump(*words)
     assert (code, err) == (0, "")
     assert [line.split()[:2] for line in out.splitlines()] == [
-        ["icub-jump", name] for name in ("eval", "view", "train", "plan", "bench", "export")
+        ["icub-jump", name]
+        for name in ("eval", "view", "train", "plan", "bench", "export", "--version")
     ]
 
 
@@ -47,7 +48,7 @@ def test_another_command_is_refused_in_one_line(icub_jump):
         ("train", ("--jump-height", "--ppo.log-std", "--timesteps")),
         ("view", ("--jump-height", "--camera")),
         ("plan", ("--robot", "--output")),
-        ("bench", ("FILE.json", "--table")),
+        ("bench", ("--controller", "--table")),
         ("export", ("policy", "dataset")),
     ],
 )
@@ -65,6 +66,12 @@ def test_each_command_gets_the_words_that_follow(icub_jump, command):
     assert (code, out) == (2, "")
     assert err.startswith(message)
     assert err.count("\n") == 1
+
+
+def test_the_version_names_what_a_jump_depends_on(icub_jump):
+    code, out, err = icub_jump("--version")
+    assert (code, err) == (0, "")
+    assert {"icub-jump", "mujoco", "daqp"} <= {line.split()[0] for line in out.splitlines()}
 
 
 def test_an_interrupt_while_python_imports_ends_quietly(icub_jump, monkeypatch):

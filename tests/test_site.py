@@ -74,11 +74,13 @@ def test_a_tutorial_says_what_it_says(file, tmp_path, monkeypatch):
     fresh = nbformat.read(file, as_version=4)
     NotebookClient(fresh, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
     for before, now in zip(kept.cells, fresh.cells, strict=True):
-        if "train" in file.stem:  # whose bits depend on the processor
-            assert len(printed(before)) == len(printed(now))
-        else:
+        if (
+            "6,000 steps" not in before.source
+        ):  # what little learning comes to differs by processor
             assert printed(before) == printed(now)
 
 
 def printed(cell):
-    return [output["text"] for output in cell.get("outputs", ()) if output.get("name") == "stdout"]
+    """What a cell prints, in however many pieces it came."""
+    outputs = cell.get("outputs", ())
+    return "".join(output["text"] for output in outputs if output.get("name") == "stdout")

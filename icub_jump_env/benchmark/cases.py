@@ -77,7 +77,12 @@ CASES: Mapping[str, Case] = MappingProxyType(
 )
 """By name, in the order of the table."""
 
-SET_BY_THE_BENCHMARK = ("jump_height", "jumps", "randomization", "success")
+FIXED = (
+    *("jump_height", "jumps", "randomization", "success"),
+    *("robot", "ankle_shift", "timestep", "self_collision"),
+    *("actuators", "sensors", "command_delay"),
+)
+"""Fields of the configuration that an entry may not set: those of the cases, and what the robot is."""
 
 
 def succeeds(episode: Episode) -> bool:

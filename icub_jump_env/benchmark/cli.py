@@ -4,115 +4,83 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
+import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
-from icub_jump_env.benchmark.cases import CASES, EPISODES, FIRST_SEED, SET_BY_THE_BENCHMARK
-from icub_jump_env.benchmark.results import Result, Score
-from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import ConfigError, InvalidValueError
-from icub_jump_env.evaluation.cli import contenders_of, guarded, read_options
-from icub_jump_env.evaluation.episodes.cluster import Jobs
-from icub_jump_env.evaluation.episodes.contender import Contender
-from icub_jump_env.evaluation.episodes.series import Series
+from icub_jump_env.benchmark.cases import CASES
+from icub_jump_env.benchmark.results import Result
+from icub_jump_env.checks import check_count
+from icub_jump_env.errors import InvalidValueError, printable
+from icub_jump_env.evaluation.cli import guarded
+from icub_jump_env.evaluation.entry import EntryOptions, parse_entry
 from icub_jump_env.evaluation.quantities import CM, PERCENT
 from icub_jump_env.evaluation.report.output import check_writable, new_table, say, show
-from icub_jump_env.evaluation.report.provenance import provenance
-from icub_jump_env.robot.kinematics import FeetFixedKinematics
 
-USAGE = """\
-icub-jump bench FILE.json ...       jump the benchmark and write the result
-icub-jump bench --table FILE ...    a table of results
-... are options of icub-jump eval that say what jumps: --env ICubJump-v1 --policy torque --jobs 2\
-"""
+
+@dataclass(frozen=True, kw_only=True)
+class BenchOptions(EntryOptions):
+    """Jump the benchmark: ten cases of 100 episodes; an interrupted run goes on.
+
+    ``icub-jump bench --table FILE ...`` prints a table of results instead.
+
+    Attributes:
+        file: The result, a JSON file.
+        name: What tables call it; by default environment, controller and policy.
+        jobs: Processes that work in parallel.
+    """
+
+    file: tyro.conf.Positional[Path]
+    name: str | None = None
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_count("jobs", self.jobs, 1, unit="processes")
 
 
 def bench(arguments: Sequence[str]) -> None:
     """Run ``icub-jump bench`` with these arguments."""
-    if not arguments or arguments[0] in ("-h", "--help"):
-        print(USAGE)
-        return
-    guarded(lambda: _bench(*arguments))
+    guarded(lambda: _bench(arguments))
 
 
-def _bench(first: str, *words: str) -> None:
+def _bench(arguments: Sequence[str]) -> None:
     console, progress = Console(), Console(stderr=True)
-    if first == "--table":
-        if not words:
-            raise InvalidValueError("--table", None, "files")
-        show(console, leaderboard([Result.read(Path(word)) for word in words]))
+    if arguments[:1] == ["--table"]:
+        if len(arguments) == 1:
+            raise InvalidValueError("table", None, "files of results")
+        show(console, leaderboard([Result.read(Path(word)) for word in arguments[1:]]))
         return
-    if first.startswith("-"):
-        raise InvalidValueError("bench", first, "a file before options")
-    options = read_options(words)
-    _check_free(options.config)
-    (contender,) = contenders_of(options)
-    check_writable("bench", Path(first))
-    result = jump(options.config, contender, EPISODES, options.workers, progress)
-    result.write(Path(first))
+    options = parse_entry(BenchOptions, arguments, file=tyro.MISSING)
+    from icub_jump_env.benchmark.run import jump
+
+    check_writable("file", options.file)
+    contender = options.contender()
+    name = options.name or f"{options.env}, {options.config.controller_name}, {contender.name}"
+    result = jump(options.config, name, contender, options.jobs, progress)
+    result.write(options.file)
     show(console, details(result))
-    say(progress, f"wrote {first}")
-
-
-def _check_free(config: JumpConfig) -> None:
-    for field in SET_BY_THE_BENCHMARK:
-        value, default = getattr(config, field), getattr(JumpConfig(), field)
-        if value != default:
-            raise ConfigError(field, value, "left to the benchmark")
-
-
-def jump(
-    config: JumpConfig, contender: Contender, episodes: int, jobs: Jobs, progress: Console
-) -> Result:
-    """Jump all cases; an interrupted run goes on where it stopped.
-
-    Args:
-        config: The entry, but for what the cases set.
-        contender: What acts in it.
-        episodes: Of each case.
-        jobs: Number of worker processes, or a cluster.
-        progress: Where the progress is shown.
-    """
-    standing = standing_height(config)
-    scores = {}
-    for number, (name, case) in enumerate(CASES.items()):
-        first = FIRST_SEED + number * EPISODES
-        series = Series(case.of(config), range(first, first + episodes), contender)
-        scores[name] = Score.of(series.complete(jobs, progress), standing)
-    source = provenance(config, FIRST_SEED) | {"policy": contender.identity}
-    return Result(f"{config.controller_name}, {contender.name}", scores, source)
-
-
-def standing_height(config: JumpConfig) -> float:
-    """Height of the CoM (m) of the robot that stands upright, all joints at zero."""
-    kinematics = FeetFixedKinematics(config.robot_value)
-    kinematics.update(np.zeros(config.robot_value.n_joints))
-    return float(kinematics.com[2])
+    say(progress, f"wrote {options.file}")
 
 
 def details(result: Result) -> Table:
     """A row for each case."""
     table = new_table(
-        1, "case", "", "success, %", "95 %", "rise, cm", "above standing, cm", "failed",
-        title=f"Jump benchmark: {result.entry}",
+        2, "case", "", "success, %", "95 %", "rise, cm", "above standing, cm", "failed",
+        title=f"Jump benchmark: {_literal(result.entry)}",
     )  # fmt: skip
     for name, score in result.scores.items():
-        failed = ", ".join(f"{n} {kind}" for kind, n in score.failures.items())
+        failed = ", ".join(f"{n} {_literal(kind)}" for kind, n in score.failures.items())
         table.add_row(
             name, CASES[name].meaning, f"{PERCENT * score.success.share:.0f}", score.success.bounds,
-            *map(_cm, (score.rise, score.above_standing)), failed,
+            _cm(score.rise), _cm(score.above_standing), failed,
         )  # fmt: skip
-    mean, (low, high) = result.total
     table.add_section()
-    table.add_row(
-        "all",
-        "mean of the cases",
-        f"{PERCENT * mean:.1f}",
-        f"{PERCENT * low:.1f} to {PERCENT * high:.1f}",
-    )
+    table.add_row("all", "mean of the cases", *_total(result))
     return table
 
 
@@ -120,12 +88,19 @@ def leaderboard(results: Sequence[Result]) -> Table:
     """A row for each result, the best first."""
     table = new_table(1, "entry", "all, %", "95 %", *CASES, title="Jump benchmark: success, %")
     for result in sorted(results, key=lambda result: -result.total[0]):
-        mean, (low, high) = result.total
-        table.add_row(
-            result.entry, f"{PERCENT * mean:.1f}", f"{PERCENT * low:.1f} to {PERCENT * high:.1f}",
-            *(f"{PERCENT * score.success.share:.0f}" for score in result.scores.values()),
-        )  # fmt: skip
+        shares = (f"{PERCENT * score.success.share:.0f}" for score in result.scores.values())
+        table.add_row(_literal(result.entry), *_total(result), *shares)
     return table
+
+
+def _total(result: Result) -> tuple[str, str]:
+    mean, (low, high) = result.total
+    return f"{PERCENT * mean:.1f}", f"{PERCENT * low:.1f} to {PERCENT * high:.1f}"
+
+
+def _literal(text: str) -> str:
+    """What others wrote, neither obeyed by the terminal nor taken for markup."""
+    return escape(printable(text))
 
 
 def _cm(height: float) -> str:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from icub_jump_env.benchmark.cases import CASES, VERSION, succeeds
+from icub_jump_env.benchmark.cases import CASES, EPISODES, VERSION, succeeds
 from icub_jump_env.checks import check_count, check_number, check_type
-from icub_jump_env.errors import ConfigError, FileError
+from icub_jump_env.errors import FileError
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.statistics.intervals import CONFIDENCE, Interval
 from icub_jump_env.evaluation.statistics.summary import Rate
@@ -118,7 +118,7 @@ class Result:
             if digest != _digest(content):
                 raise ValueError("its hash is another one: the file was changed")
             return cls._of(content)
-        except (ValueError, TypeError, KeyError, ConfigError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise FileError(str(path), f"no result of this benchmark: {error}") from error
 
     def _content(self) -> dict[str, Any]:
@@ -140,7 +140,7 @@ class Result:
             raise ValueError(f"its cases are not {', '.join(CASES)}")
         scores = {}
         for name, given in content["scores"].items():
-            total = check_count("total", given["success"]["total"], 1)
+            total = check_count("total", given["success"]["total"], EPISODES, EPISODES)
             count = check_count("count", given["success"]["count"], 0, total)
             failures = {
                 str(kind): check_count(kind, n, 0) for kind, n in given["failures"].items()

@@ -277,3 +277,14 @@ CONTROLLERS: dict[ControllerName, VelocityConfig | TorqueConfig] = {
     "torque": TorqueConfig(),
 }
 """Controllers by name."""
+
+
+def check_own(config: VelocityConfig | TorqueConfig) -> None:
+    """Refuse a controller of the user's own where a file shall say what jumped.
+
+    Raises:
+        ConfigError: If it is of a class of its own.
+    """
+    if type(config) not in (VelocityConfig, TorqueConfig):
+        allowed = "VelocityConfig or TorqueConfig: a file cannot hold a class"
+        raise ConfigError("controller", type(config).__qualname__, allowed)

@@ -18,14 +18,14 @@ import tyro
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import ICubJumpError, PolicyMismatchError, one_line, shown
+from icub_jump_env.errors import ICubJumpError, one_line, shown
 from icub_jump_env.evaluation.options import EvalOptions
 from icub_jump_env.files import read_json
 from icub_jump_env.simulation.opengl import import_mujoco
 from icub_jump_env.versions import VERSIONS, EnvName
 
 if TYPE_CHECKING:
-    from icub_jump_env.evaluation.episodes.contender import Contender
+    from icub_jump_env.policy.card import PolicyCard
 
 T = TypeVar("T")
 
@@ -125,39 +125,10 @@ def evaluate(arguments: Sequence[str]) -> None:
     guarded(lambda: _evaluate(arguments))
 
 
-def read_options(arguments: Sequence[str]) -> EvalOptions:
-    """What a command line asks for.
-
-    Raises:
-        ConfigError: If a value is out of range.
-    """
-    return parse(EvalOptions, arguments, _defaults(arguments))
-
-
-def contenders_of(options: EvalOptions) -> list[Contender]:
-    """The policies that shall act, or the baseline.
-
-    Raises:
-        ICubJumpError: If one cannot be read, or was made for another environment.
-    """
-    # Imported here, like the modes, so that --help and bad arguments answer at once.
-    from icub_jump_env.evaluation.episodes.contender import read_contenders
-    from icub_jump_env.policy import check_match
-
-    words = options.compare or (options.policy or "baseline",)
-    contenders = read_contenders([str(word) for word in words])
-    for contender in contenders:
-        if contender.card is not None:
-            try:
-                check_match(contender.card, options.config)
-            except PolicyMismatchError as error:
-                raise ICubJumpError(f"{contender.name}: {error}") from error
-    return contenders
-
-
 def _evaluate(arguments: Sequence[str]) -> None:
-    options = read_options(arguments)
+    options = parse(EvalOptions, arguments, _defaults(arguments))
     import_mujoco()
+    # Imported here, like the modes, so that --help and bad arguments answer at once.
     from icub_jump_env.evaluation.report.output import check_writable, say
 
     for name in ("json", "video", "results"):
@@ -172,8 +143,12 @@ def _evaluate(arguments: Sequence[str]) -> None:
         check_video(options.video)
 
     from icub_jump_env.evaluation.episodes.cluster import Cluster
+    from icub_jump_env.evaluation.episodes.contender import check_contender, read_contenders
 
-    contenders = contenders_of(options)
+    words = options.compare or (options.policy or "baseline",)
+    contenders = read_contenders([str(word) for word in words])
+    for contender in contenders:
+        check_contender(contender, options.config)
     if isinstance(options.workers, Cluster):
         options.workers.connect()  # before any file is touched
     console, progress = Console(), Console(stderr=True)
@@ -185,29 +160,38 @@ def _evaluate(arguments: Sequence[str]) -> None:
         say(progress, f"wrote {options.video}")
 
 
-def _defaults(arguments: Sequence[str]) -> EvalOptions:
-    """What holds where a command line says nothing, if that is not the usual.
+def default_config(arguments: Sequence[str]) -> JumpConfig:
+    """The jump where a command line says nothing, if that is not the usual.
 
-    The defaults of the environment that it names, and what its policies were trained for.
+    The defaults of the environment that it names, and what its policy was trained for.
     """
-    found = seek(arguments, "env", "compare", "policy")
-    env = found.pop("env", ["ICubJump-v0"])[0]
+    found = seek(arguments, "env", "policy")
+    env = found.get("env", ["ICubJump-v0"])[0]
     config = JumpConfig.of(**VERSIONS.get(cast("EnvName", env), {}))
-    options = EvalOptions(config=config)
-    if not found:
-        return options
-    from icub_jump_env.evaluation.episodes.contender import as_trained, read_contenders
+    card = _first_card(found.get("policy", ()))
+    return config if card is None else card.as_trained(config)
 
-    contenders = read_contenders(found.get("compare") or found["policy"])
-    cards = [contender.card for contender in contenders if contender.card is not None]
-    if not cards:
-        return options
-    config = as_trained(cards[0], config)
-    if "compare" in found:
-        config = dataclasses.replace(config, jump_height=cards[0].config.jump_height)
-        # A range of commands is for this mode alone.
-        return EvalOptions(config=config, compare=tuple(found["compare"]))
-    return EvalOptions(config=config)
+
+def _defaults(arguments: Sequence[str]) -> EvalOptions:
+    """Likewise of eval.py, which compares policies, too."""
+    config, compared = default_config(arguments), seek(arguments, "compare").get("compare")
+    card = _first_card(compared or ())
+    if card is None:
+        return EvalOptions(config=config)
+    config = card.as_trained(config)
+    # A range of commands is for this mode alone.
+    config = dataclasses.replace(config, jump_height=card.config.jump_height)
+    return EvalOptions(config=config, compare=tuple(compared or ()))
+
+
+def _first_card(words: Sequence[str]) -> PolicyCard | None:
+    """Of the policies that a command line names."""
+    if not words:
+        return None
+    from icub_jump_env.evaluation.episodes.contender import read_contenders
+
+    cards = (contender.card for contender in read_contenders(words))
+    return next((card for card in cards if card is not None), None)
 
 
 def _one_line(complaint: str) -> str:
@@ -220,6 +204,7 @@ def _one_line(complaint: str) -> str:
         message.append(line)
     # tyro says so where a dataclass itself refused; the user knows no dataclass.
     text = re.sub(r"^Error parsing \w*Options: ", "", " ".join(message)) or "bad arguments"
+    text = re.sub(r"^Missing from \S+: ", "missing: ", text)
     if text.startswith("Unrecognized options"):
         # Sorted: tyro has them in any order.
         similar = sorted(set(re.findall(r"^│ {5}(--[\w.-]+)", complaint, re.MULTILINE)))

@@ -10,7 +10,8 @@ from pathlib import Path
 import gymnasium
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import MissingDependencyError
+from icub_jump_env.control.config import check_own
+from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.policy import Policy
 from icub_jump_env.versions import ENV_ID
 
@@ -31,15 +32,24 @@ def write_dataset(
         Its folder.
 
     Raises:
+        ConfigError: If there is one of that name, Minari refuses the name, or the controller is of
+            a class that no file can hold.
         MissingDependencyError: Without the package ``minari``.
-        ValueError: If there is one of that name, or Minari refuses the name.
     """
     try:
         import h5py  # noqa: F401 (Minari writes with it)
         import minari
         from minari.data_collector import EpisodeBuffer
+        from minari.dataset.minari_dataset import parse_dataset_id
     except ImportError:
         raise MissingDependencyError("a dataset needs the extra 'export'") from None
+    try:
+        parse_dataset_id(name)
+    except (ValueError, TypeError) as error:
+        raise ConfigError("dataset", name, f"a name such as icub/jump/mine-v0: {error}") from None
+    if name in minari.list_local_datasets():
+        raise ConfigError("dataset", name, "another name: there is one called so")
+    check_own(config.controller_config)
     env = gymnasium.make(ENV_ID, **dataclasses.asdict(config))
     episodes = []
     for seed in seeds:

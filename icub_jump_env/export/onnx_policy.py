@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from icub_jump_env.errors import ConfigError, MissingDependencyError
+from icub_jump_env.files import strict_json, write_files
 from icub_jump_env.planning.residual import AXES, COM_AXES
 from icub_jump_env.policy import NetworkPolicy
 from icub_jump_env.policy.saving import LoadedPolicy
@@ -47,8 +47,8 @@ def write_onnx(policy: LoadedPolicy, path: Path) -> None:
         ir_version=8,
     )
     onnx.checker.check_model(model)
-    onnx.save(model, path)
-    path.with_suffix(".json").write_text(json.dumps(manifest(policy), indent=2) + "\n")
+    told = strict_json(manifest(policy), indent=2) + "\n"
+    write_files({path.with_suffix(".json"): told.encode(), path: model.SerializeToString()})
 
 
 def manifest(policy: LoadedPolicy) -> dict[str, Any]:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from icub_jump_env.errors import FileError
+from icub_jump_env.files import write_file
 from icub_jump_env.planning.plan import JumpPlan, Setpoint
 from icub_jump_env.robot.robot import Robot
 from icub_jump_env.snapshot import Snapshot
@@ -34,7 +38,7 @@ def write_jump(snapshots: Sequence[Snapshot], robot: Robot, path: Path) -> None:
 
 
 def write_plan(plan: JumpPlan, robot: Robot, frequency: float, path: Path) -> None:
-    """A plan: its set point at the control ticks from the start to take-off.
+    """A plan: its set point at the control ticks from the start on, and at take-off.
 
     The CoM is that from where it is when the jump begins.
 
@@ -47,27 +51,30 @@ def write_plan(plan: JumpPlan, robot: Robot, frequency: float, path: Path) -> No
     Raises:
         OSError: If the file system refuses.
     """
-    times = np.append(np.arange(0.0, plan.duration, 1.0 / frequency), plan.duration)
+    ticks = math.ceil(plan.duration * frequency - 1e-9)
+    times = [*(tick / frequency for tick in range(ticks)), plan.duration]
     names = list(Setpoint.__annotations__)
 
     def row(time: float) -> dict[str, Cell]:
         setpoint = plan.sample(time)
         return {"time": time} | _flat({name: getattr(setpoint, name) for name in names}, robot)
 
-    _write((row(float(time)) for time in times), path)
+    _write(map(row, times), path)
 
 
 def read_table(path: Path) -> dict[str, list[Cell]]:
     """The columns of a file by name; numbers where all are.
 
     Raises:
+        FileError: If rows are of different lengths.
         OSError: If the file cannot be read.
     """
     with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
+        names, *rows = csv.reader(file) or [[]]
+    if any(len(row) != len(names) for row in rows):
+        raise FileError(str(path), "rows of different lengths")
     columns: dict[str, list[Cell]] = {}
-    for name in rows[0] if rows else ():
-        words = [row[name] for row in rows]
+    for name, words in zip(names, zip(*rows, strict=True), strict=False):
         try:
             columns[name] = [float(word) for word in words]
         except ValueError:
@@ -88,8 +95,8 @@ def _flat(values: Mapping[str, Cell | NDArray[np.float64]], robot: Robot) -> dic
 
 
 def _write(rows: Iterable[Mapping[str, Cell]], path: Path) -> None:
-    rows = list(rows)
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    rows, text = list(rows), io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(rows[0]))
+    writer.writeheader()
+    writer.writerows(rows)
+    write_file(path, text.getvalue().encode())

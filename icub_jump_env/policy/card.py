@@ -153,6 +153,11 @@ class PolicyCard:
             raise ConfigError(name, values.get(name), allowed)
         return cls(**values)
 
+    def as_trained(self, jump: JumpConfig) -> JumpConfig:
+        """A jump, with what the policy depends on as it was in its training."""
+        trained = {field: self.config.value_of(field) for field in TASK_FIELDS}
+        return jump.replace(**trained | {"controller": self.config.controller})
+
     def as_dict(self) -> dict[str, Any]:
         """Mappings, lists and numbers, as JSON has them."""
         return dataclasses.asdict(self)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from icub_jump_env.checks import check_type
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import check_own
 from icub_jump_env.errors import ConfigError, PolicyFileError
 from icub_jump_env.policy.card import PolicyCard, check_match
 from icub_jump_env.policy.files import load_tensors, save_tensors
@@ -72,6 +73,7 @@ def save_policy(
         OSError: If the file system refuses.
     """
     check_type("policy", policy, NetworkPolicy, ReplayPolicy)
+    check_own(config.controller_config)
     if isinstance(policy, ReplayPolicy) and policy.agent_frequency != config.agent_frequency:
         raise ConfigError(
             "agent_frequency",

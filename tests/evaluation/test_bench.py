@@ -5,23 +5,27 @@ import json
 import numpy as np
 import pytest
 
-from icub_jump_env.benchmark import cli
+from experiments import seeds
 from icub_jump_env.benchmark.cases import CASES, EPISODES, FIRST_SEED, SUCCESS, succeeds
-from icub_jump_env.benchmark.cli import bench, standing_height
+from icub_jump_env.benchmark.cli import bench
+from icub_jump_env.benchmark.results import Result
+from icub_jump_env.benchmark.run import standing_height
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
+from icub_jump_env.policy import load_policy
 
 
 @pytest.fixture
 def few(monkeypatch):
     kept = {name: CASES[name] for name in ("nominal", "five")}
-    for module in ("cases", "cli", "results"):
+    for module in ("run", "cli", "results"):
         monkeypatch.setattr(f"icub_jump_env.benchmark.{module}.CASES", kept)
-    monkeypatch.setattr(cli, "EPISODES", 2)
+    for module in ("run", "results"):
+        monkeypatch.setattr(f"icub_jump_env.benchmark.{module}.EPISODES", 2)
 
 
 def test_the_result_is_what_the_episodes_say(few, tmp_path, capsys):
-    bench(["r.json", "--controller", "torque"])
+    bench(["r.json", "--controller", "torque", "--jobs", "2"])
     out = capsys.readouterr().out
     assert "five jumps of 4 cm in a row" in out
     written = json.loads((tmp_path / "r.json").read_text())
@@ -32,14 +36,30 @@ def test_the_result_is_what_the_episodes_say(few, tmp_path, capsys):
     assert score["success"] == {"count": sum(map(succeeds, episodes)), "total": 2}
     assert score["rise"] == np.mean([e.jump["flight_height"] for e in episodes])
     assert written["source"]["config"]["controller"] == "torque"
-    assert written["source"]["policy"]
+    assert written["source"]["policy"] == {"name": "baseline", "sha256": None}
     bench(["--table", "r.json"])
-    assert "torque, baseline" in capsys.readouterr().out
+    assert "ICubJump-v0, torque, baseline" in capsys.readouterr().out
 
 
-def test_seeds_of_the_cases_do_not_overlap():
+def test_a_policy_is_an_entry(few, tmp_path):
+    bench(["r.json", "--policy", "velocity", "--name", "ours [/x]"])
+    result = Result.read(tmp_path / "r.json")
+    assert result.source["policy"]["name"] == "velocity"
+    config = load_policy("velocity").card.config.replace(**CASES["nominal"].jump, success=SUCCESS)
+    env = make_env(config)
+    rises = [
+        run_episode(env, FIRST_SEED + seed, load_policy("velocity")).jump["flight_height"]
+        for seed in range(2)
+    ]
+    assert result.scores["nominal"].rise == np.mean(rises)
+    bench(["--table", "r.json"])  # its name is shown as it is
+
+
+def test_no_experiment_uses_the_seeds_of_the_benchmark():
+    used = [value for value in vars(seeds).values() if isinstance(value, range)]
+    assert len(used) > 5
+    assert max(each.stop for each in used) <= FIRST_SEED
     assert EPISODES * len(CASES) == 1000
-    assert FIRST_SEED == 20_000  # beyond all of experiments/seeds.py
 
 
 def test_the_robot_stands_higher_than_it_crouches():
@@ -54,8 +74,11 @@ def test_the_robot_stands_higher_than_it_crouches():
     [
         (["r.json", "--jump-height", "0.05"], "jump_height=0.05 is not allowed: left to"),
         (["r.json", "--randomization", "hard"], "randomization='hard' is not allowed: left to"),
-        (["--controller", "torque"], "bench='--controller' is not allowed: a file before"),
-        (["--table"], "files"),
+        (["r.json", "--robot", "iCubGenova02"], "robot='iCubGenova02' is not allowed: left to"),
+        (["r.json", "--com-scaling", "acceleration"], "at most 0.054 m"),
+        (["--controller", "torque"], "missing: PATH"),
+        (["r.json", "--seed", "3"], "Unrecognized options: --seed"),
+        (["--table"], "files of results"),
         (["--table", "nothing.json"], "nothing.json"),
     ],
 )

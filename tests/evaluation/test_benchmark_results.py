@@ -1,5 +1,6 @@
 """Results of the benchmark: what counts, what is written, and what is refused."""
 
+import hashlib
 import json
 import math
 
@@ -11,6 +12,7 @@ from icub_jump_env.benchmark.results import Result, Score
 from icub_jump_env.errors import FileError
 from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.statistics.summary import Rate
+from icub_jump_env.files import strict_json
 
 
 def test_who_is_not_still_for_two_seconds_does_not_count():
@@ -79,6 +81,30 @@ def replaced(path, change):
 def test_a_changed_file_is_refused(tmp_path, change, problem):
     result(*[90] * 10).write(tmp_path / "r.json")
     replaced(tmp_path / "r.json", change)
+    with pytest.raises(FileError, match=problem):
+        Result.read(tmp_path / "r.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (lambda c: c.update(benchmark=2), "benchmark=2"),
+        (lambda c: c.update(entry=5), "entry"),
+        (lambda c: c["scores"].pop("low"), "cases"),
+        (lambda c: c.update(scores=list(c["scores"])), "no result"),
+        (lambda c: c["scores"]["low"]["success"].update(count=101), "count=101"),
+        (lambda c: c["scores"]["low"]["success"].update(count=1, total=1), "total=1"),
+        (lambda c: c["scores"]["low"].update(failures=["too low"]), "no result"),
+        (lambda c: c["scores"]["low"].update(rise="high"), "rise"),
+    ],
+)
+def test_a_file_with_a_true_hash_may_still_be_no_result(tmp_path, change, problem):
+    result(*[90] * 10).write(tmp_path / "r.json")
+    content = json.loads((tmp_path / "r.json").read_text())
+    content.pop("sha256")
+    change(content)
+    content["sha256"] = hashlib.sha256(strict_json(content).encode()).hexdigest()
+    (tmp_path / "r.json").write_text(json.dumps(content))
     with pytest.raises(FileError, match=problem):
         Result.read(tmp_path / "r.json")
 

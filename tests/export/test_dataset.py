@@ -2,8 +2,10 @@
 
 import minari
 import numpy as np
+import pytest
 
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.export.dataset import write_dataset
 from icub_jump_env.policy import load_policy
 
@@ -16,6 +18,8 @@ def test_the_recovered_environment_repeats_the_episodes(tmp_path, monkeypatch):
     )
     folder = write_dataset("icub/jump/test-v0", config, policy, [7, 8], "velocity")
     assert tmp_path in folder.parents
+    with pytest.raises(ConfigError, match="there is one called so"):
+        write_dataset("icub/jump/test-v0", config, policy, [7, 8], "velocity")
     dataset = minari.load_dataset("icub/jump/test-v0")
     assert dataset.spec.total_episodes == 2
     env = dataset.recover_environment()

@@ -13,12 +13,16 @@ from icub_jump_env.policy import load_policy
     ("words", "complaint"),
     [
         (["video"], "export='video' is not allowed: one of policy, plan, jump, dataset"),
-        (["policy", "velocity"], "policy='velocity' is not allowed: a policy and a file"),
-        (["policy", "velocity", "x.onnx", "--fast"], "policy='--fast' is not allowed: no options"),
-        (["jump", "--seed", "3"], "jump='--seed 3' is not allowed: a file before options"),
+        (["policy", "velocity"], "missing: PATH"),
+        (["policy", "velocity", "x.onnx", "--fast"], "Unrecognized options: --fast"),
+        (["policy", "velocity", "x.json"], "file='x.json' is not allowed: a file whose name ends"),
+        (["jump", "--seed", "3"], "missing: PATH"),
+        (["jump", "x.csv", "--compare", "a", "b"], "Unrecognized options: --compare"),
+        (["dataset", "bad name", "--episodes", "2"], "dataset='bad name' is not allowed"),
         (["jump", "x.csv", "--jump-height", "9"], "jump_height=9.0 is not allowed"),
         (["policy", "nobody", "x.onnx"], "nobody"),
         (["plan", "nowhere/x.csv"], "nowhere/x.csv"),
+        (["jump", "nowhere/x.csv"], "nowhere/x.csv"),
     ],
 )
 def test_bad_words_end_with_one_line_and_write_nothing(tmp_path, capsys, words, complaint):
@@ -34,8 +38,8 @@ def test_bad_words_end_with_one_line_and_write_nothing(tmp_path, capsys, words, 
 
 def test_help_names_all(capsys):
     export([])
-    assert [line.split()[2] for line in capsys.readouterr().out.splitlines()[:-1]] == [
-        "policy", "plan", "jump", "dataset",
+    assert [line.split()[2] for line in capsys.readouterr().out.splitlines()] == [
+        "policy", "plan", "jump", "dataset", "jump",
     ]  # fmt: skip
 
 

@@ -365,6 +365,21 @@ class TestSlip:
         assert recorder.metrics.sole_slip == 0.0
 
 
+def test_still_is_who_has_been_slow_since():
+    """Slow for 0.2 s, then in one direction too fast, then slow for 0.3 s."""
+    recorder = JumpRecorder(LIMITS, 1.0)
+    for step in range(501):
+        velocity = (0.0, -0.051, 0.0) if step == 200 else (0.03, 0.0, -0.039)
+        recorder.update(state(step * DT, com_velocity=velocity))
+        if step == 199:
+            assert recorder.metrics.still_time == pytest.approx(0.199)
+        if step == 200:
+            assert recorder.metrics.still_time == 0.0
+    assert recorder.metrics.still_time == pytest.approx(0.3)
+    recorder.reset()
+    assert recorder.metrics.still_time == 0.0
+
+
 def test_lean_is_that_of_the_end():
     recorder = JumpRecorder(LIMITS, 0.3)
     stand(recorder, 0.0, 0.1, chest_up=leaning(40.0, 10.0))

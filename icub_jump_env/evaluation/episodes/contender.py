@@ -10,10 +10,9 @@ from pathlib import Path
 
 from icub_jump_env import policy
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import ConfigError, printable
+from icub_jump_env.errors import ConfigError, ICubJumpError, PolicyMismatchError, printable
 from icub_jump_env.files import strict_json
-from icub_jump_env.policy import Policy, PolicyCard, load_policy
-from icub_jump_env.policy.card import TASK_FIELDS
+from icub_jump_env.policy import Policy, PolicyCard, check_match, load_policy
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,14 @@ def read_contenders(words: Sequence[str]) -> list[Contender]:
     return contenders
 
 
-def as_trained(card: PolicyCard, jump: JumpConfig) -> JumpConfig:
-    """A jump, with what the policy depends on as it was in its training."""
-    trained = {field: card.config.value_of(field) for field in TASK_FIELDS}
-    return jump.replace(**trained | {"controller": card.config.controller})
+def check_contender(contender: Contender, config: JumpConfig) -> None:
+    """Refuse a policy that was made for another jump.
+
+    Raises:
+        ICubJumpError: If it was; names the policy.
+    """
+    if contender.card is not None:
+        try:
+            check_match(contender.card, config)
+        except PolicyMismatchError as error:
+            raise ICubJumpError(f"{contender.name}: {error}") from error

@@ -20,7 +20,13 @@ from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
 from icub_jump_env.evaluation.episodes.rollout import Episode
 from icub_jump_env.evaluation.quantities import commands
 from icub_jump_env.evaluation.report.output import progress_display, say
-from icub_jump_env.evaluation.report.provenance import plans, provenance, source, versions
+from icub_jump_env.evaluation.report.provenance import (
+    own_controller,
+    plans,
+    provenance,
+    source,
+    versions,
+)
 from icub_jump_env.files import strict_json
 from icub_jump_env.simulation.randomization import Randomization
 from icub_jump_env.simulation.sensor_models import SensorConfig
@@ -98,6 +104,7 @@ class Series:
                 self.contender.identity,
                 source(),
                 plans(self.config),
+                own_controller(self.config),
                 versions(),
             ]
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
+import inspect
 import platform
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,8 @@ from typing import Any
 
 import icub_jump_env
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.control.config import TorqueConfig, VelocityConfig
+from icub_jump_env.errors import ConfigError
 
 _PACKAGES = (
     "daqp",
@@ -38,6 +41,7 @@ def provenance(config: JumpConfig, seed: int) -> dict[str, Any]:
         "versions": versions(),
         SOURCE: source(),
         "plans": plans(config),
+        "controller": own_controller(config),
         "config": dataclasses.asdict(config),
         "seed": seed,
     }
@@ -69,6 +73,22 @@ def _hash(folder: Path, files: Sequence[Path]) -> str:
 def plans(config: JumpConfig) -> str | None:
     """Hash of the whole-body plans; None where nothing follows any."""
     return config.plan_family.card["sha256"] if config.planner == "whole_body" else None
+
+
+def own_controller(config: JumpConfig) -> str | None:
+    """Name and hash of the code of a controller of the user's own; None of ours.
+
+    Raises:
+        ConfigError: If its code is in no file.
+    """
+    kind = type(config.controller_config)
+    if kind in (VelocityConfig, TorqueConfig):
+        return None
+    try:
+        code = Path(inspect.getfile(kind)).read_bytes()
+    except (TypeError, OSError):
+        raise ConfigError("controller", kind.__qualname__, "a class in a file") from None
+    return f"{kind.__module__}.{kind.__qualname__} {hashlib.sha256(code).hexdigest()[:16]}"
 
 
 def versions(*more: str) -> dict[str, str]:
