@@ -42,12 +42,11 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """The iCub jumps from a crouch; an agent may shift the set point meanwhile.
 
     ## Description
-    The controller of Bergonti, Fiorio and Pucci ("Torque and velocity controllers to
-    perform jumps with a humanoid robot") launches the robot along a CoM trajectory
-    scaled to the commanded height, retracts the feet in flight and holds a posture to
-    land: v0. In v1 the launch follows whole-body plans, an IMU says where the robot is in the
-    air, and feedback places the feet and catches the landing. The baseline needs no agent:
-    action zero is the pure controller, bit for bit.
+    The controller of Bergonti, Fiorio and Pucci ("Torque and velocity controllers to perform jumps
+    with a humanoid robot") launches the robot along a CoM trajectory scaled to the commanded height,
+    retracts the feet in flight and holds a posture to land: v0. In v1 the launch follows whole-body
+    plans, an IMU says where the robot is in the air, and feedback places the feet and catches the
+    landing. The baseline needs no agent: action zero is the pure controller, bit for bit.
 
     ## Action space
     ``Box(-1, 1, (n,), float32)``: target offset of the set point along each of ``residual_axes`` in
@@ -66,9 +65,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     :func:`icub_jump_env.reward.reward_terms`.
 
     ## Starting state
-    At rest in the plan's crouch, soles flat on the floor, the world origin on the floor midway
-    between the feet. World +x is where the robot faces, +y left, +z up; positive pitch
-    about +y.
+    At rest in the plan's crouch, soles flat on the floor, the world origin on the floor midway between
+    the feet. World +x is where the robot faces, +y left, +z up; positive pitch about +y.
 
     ## Episode end
     With ``jumps`` above 1 the robot stands, crouches and jumps again, see docs/environment.md.
@@ -95,8 +93,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Version history
     * v1: the same with other defaults: ``planner="whole_body"``, ``estimator="imu"``,
       ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.versions.VERSIONS`).
-    * v0: Initial version: the paper's jump. It stays as it is, whatever Gymnasium says of newer
-      ones.
+    * v0: the paper's jump. It stays as it is, whatever Gymnasium says of newer ones.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (declared so by Gymnasium)
