@@ -1,3 +1,6 @@
+# /// script
+# dependencies = ["torch"]
+# ///
 """PPO in one file: what it takes to learn a residual, without a library for it (torch alone).
 
     python examples/ppo.py --steps 150000 --seed 0

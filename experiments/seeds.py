@@ -7,6 +7,7 @@ from agents.options import SELECTION
 from icub_jump_env.control.config import ControllerName
 
 __all__ = [
+    "ENGINE",
     "FELT_TEST",
     "FELT_TUNING",
     "FORESIGHT_TEST",
@@ -37,6 +38,9 @@ REACTING_TEST = range(7500, 8000)
 
 FELT_TUNING = range(11_000, 11_400)
 """Chose how the policies of ``disturbed`` worlds learn."""
+
+ENGINE = range(13_000, 13_200)
+"""Jumped in two simulators."""
 
 PLANNER_TEST = range(5000, 5200)
 """Held out from everything that chose whole-body plans."""

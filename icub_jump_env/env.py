@@ -52,8 +52,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ``Box(-1, 1, (n,), float32)``: target offset of the set point along each of ``residual_axes`` in
     units of ``residual_scale``, world frame; by default the CoM forward, to the left and up. A
     critically damped filter turns it into a consistent offset, velocity and acceleration. It acts in the
-    launching phase, or in all (``residual_phases``). One step lasts ``dt`` = 0.01 s by
-    default.
+    launching phase, or in all (``residual_phases``). One step lasts ``dt``, by default 0.01 s.
 
     ## Observation space
     ``Box(-10, 10, (layout.size,), float32)``: sensor readings, estimates made of them, the
@@ -100,6 +99,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         "render_modes": ["rgb_array", "human"],
         "render_fps": 100,
     }
+    engine: type[Physics] = Physics
+    """What simulates the world."""
 
     def __init__(self, **config: Any) -> None:
         """Build the world and the controllers.
@@ -121,7 +122,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         cfg, self.robot = self.config, self.config.robot_value
         self.action_space = spaces.Box(-1.0, 1.0, (len(cfg.residual.axes),), np.float32)
         self._simulation = Simulation(
-            Physics(
+            self.engine(
                 self.robot,
                 cfg.timestep,
                 visuals=self.render_mode is not None,
@@ -297,8 +298,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._renderer = make_renderer(self._simulation.physics, self.config.rendering)
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
-        simulation = self._simulation
-        physics = simulation.physics
+        simulation, physics = self._simulation, self._simulation.physics
         tick = self._controller.tick(self._state, physics.data.time, residual_target)
         if tick.report is not None:
             self._report = worse(self._report, tick.report)

@@ -119,7 +119,9 @@ class WithShortcuts(ABC):
         names = [field.name for field in dataclasses.fields(self)]
         for name, value in changes.items():
             if name not in names and name not in PATHS:
-                allowed = f"no such field; the fields are {', '.join([*names, *PATHS])}"
+                # In Python's words, too, which TorchRL looks for.
+                unknown = f"no such field (unexpected keyword argument {name!r})"
+                allowed = f"{unknown}; the fields are {', '.join([*names, *PATHS])}"
                 raise UnknownFieldError(name, value, allowed)
         fields = {name: value for name, value in changes.items() if name in names}
         made = dataclasses.replace(self, **fields)

@@ -29,7 +29,7 @@ def test_regenerating_changes_only_the_blocks(document):
     text = document.read_text()
 
     def output(command):
-        table = "observation" in command or "tables" in command
+        table = any(word in command for word in ("observation", "tables", "clients"))
         return "| new |" if table else "first\n\nlast, new"
 
     def updated(text):

@@ -1,0 +1,116 @@
+"""Run clients for real, each in a virtual environment with what it needs, and print what came of it.
+
+    python examples/clients/run.py               # all of them
+    python examples/clients/run.py skrl_ppo
+
+What a client needs stands in its first lines, as in any script with inline metadata; versions are
+those of constraints.txt where that has one and the client does not ask for another.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+HERE = Path(__file__).parent
+REPOSITORY = HERE.parents[1]
+ARGUMENTS = {"ppo": ("--steps", "4096")}
+FILES = sorted([HERE.parent / "ppo.py", *HERE.glob("*.py")])
+CLIENTS = {file.stem: file for file in FILES if file.name != "run.py"}
+
+METADATA = re.compile(r"^# /// script\n((?:# .*\n)+)# ///$", re.MULTILINE)
+NAME = re.compile(r"[\w.-]+")
+VERSIONS = "import sys; from importlib.metadata import version; print(*map(version, sys.argv[1:]))"
+
+
+class Outcome(NamedTuple):
+    """What came of a client.
+
+    Attributes:
+        client: Its name.
+        versions: Of what it needs.
+        said: Its last line, or how it failed.
+        failed: Whether it did.
+    """
+
+    client: str
+    versions: str
+    said: str
+    failed: bool
+
+
+def dependencies_of(file: Path) -> tuple[str, ...]:
+    """What a client needs beside this package."""
+    found = METADATA.search(file.read_text())
+    if found is None:
+        raise ValueError(f"{file} does not say what it needs")
+    text = "\n".join(line.removeprefix("# ") for line in found[1].splitlines())
+    return tuple(tomllib.loads(text)["dependencies"])
+
+
+def install(folder: Path, needs: Sequence[str]) -> Path:
+    """A virtual environment with this package and more; its Python."""
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    python = folder / "bin" / "python"
+    asked = {NAME.match(need)[0].lower() for need in needs if "==" in need}
+    lines = (REPOSITORY / "constraints.txt").read_text().splitlines()
+    constraints = folder / "constraints.txt"
+    constraints.write_text(
+        "\n".join(x for x in lines if x.partition("==")[0].lower() not in asked)
+    )
+    words = ["-m", "pip", "install", "-q", "-c", constraints, REPOSITORY, *needs]
+    subprocess.run([python, *words], check=True)
+    return python
+
+
+def run(client: str, python: Path, folder: Path) -> Outcome:
+    """Run a client in a folder of its own."""
+    file = CLIENTS[client]
+    names = sorted({NAME.match(need)[0] for need in (*dependencies_of(file), "gymnasium")})
+    found = subprocess.run(
+        [python, "-c", VERSIONS, *names], check=True, stdout=subprocess.PIPE, text=True
+    )
+    versions = ", ".join(map(" ".join, zip(names, found.stdout.split(), strict=True)))
+    folder.mkdir()
+    ran = subprocess.run(
+        [python, file, *ARGUMENTS.get(client, ())], cwd=folder, capture_output=True, text=True
+    )
+    lines = (ran.stdout if ran.returncode == 0 else ran.stderr).strip().splitlines()
+    failed = "" if ran.returncode == 0 else f"failed with {ran.returncode}: "
+    return Outcome(client, versions, f"{failed}{lines[-1] if lines else ''}", bool(failed))
+
+
+def main() -> None:
+    """Run them, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("client", nargs="*", choices=list(CLIENTS))
+    chosen = parser.parse_args().client or list(CLIENTS)
+    outcomes: list[Outcome] = []
+    with TemporaryDirectory() as home:
+        pythons: dict[tuple[str, ...], Path] = {}
+        for client in chosen:
+            needs = dependencies_of(CLIENTS[client])
+            if needs not in pythons:
+                pythons[needs] = install(Path(home) / f"venv{len(pythons)}", needs)
+            outcomes.append(run(client, pythons[needs], Path(home) / client))
+            print(f"{client}: {outcomes[-1].said}", file=sys.stderr)
+    print("| client | with | it says | on |\n|---|---|---|---|")
+    for outcome in outcomes:
+        file = CLIENTS[outcome.client].relative_to(REPOSITORY)
+        print(
+            f"| [{outcome.client}](../{file}) | {outcome.versions} | {outcome.said} | {datetime.date.today()} |"
+        )
+    if any(outcome.failed for outcome in outcomes):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
