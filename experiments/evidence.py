@@ -65,7 +65,6 @@ ABLATIONS = {
     "all-axes": ("--residual.axes", *AXES, "--axes", *AXES),
     "fast-filter": ("--residual.bandwidth", "40"),
     "without-law": ("--no-lean-correction",),
-    "network": NETWORK,
 }
 """Those that make each ablation there, of the velocity controller."""
 

@@ -23,7 +23,30 @@ from icub_jump_env.evaluation.modes import nominal as nominal_mode
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("ci", deadline=None, derandomize=True, max_examples=50)
+settings.register_profile("full", settings.get_profile("ci"), max_examples=10_000)
 settings.load_profile("ci")
+
+
+def pytest_addoption(parser):
+    parser.addoption("--full", action="store_true", help="as many cases as docs/reliability.md")
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "fault(name): what is tried; docs/reliability.md lists them")
+    if config.getoption("full"):
+        settings.load_profile("full")
+
+
+@pytest.fixture
+def many(request, record_property):
+    """How many cases to try: quickly, and with --full."""
+
+    def choose(quick: int, full: int) -> int:
+        count = full if request.config.getoption("full") else quick
+        record_property("cases", count)
+        return count
+
+    return choose
 
 
 @pytest.fixture

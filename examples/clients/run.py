@@ -91,8 +91,10 @@ def run(client: str, python: Path, folder: Path) -> Outcome:
 def main() -> None:
     """Run them, and print a table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("client", nargs="*", choices=list(CLIENTS))
+    parser.add_argument("client", nargs="*", help=f"of {', '.join(CLIENTS)}; all without a name")
     chosen = parser.parse_args().client or list(CLIENTS)
+    if unknown := [name for name in chosen if name not in CLIENTS]:
+        parser.error(f"{', '.join(unknown)}: there is no client of that name")
     outcomes: list[Outcome] = []
     with TemporaryDirectory() as home:
         pythons: dict[tuple[str, ...], Path] = {}

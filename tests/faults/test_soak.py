@@ -1,0 +1,46 @@
+"""Hours of use: memory stays, and the last episode is the first, bit for bit."""
+
+import gc
+
+import gymnasium
+import numpy as np
+import psutil
+import pytest
+
+from icub_jump_env.simulation.opengl import has_display  # noqa: F401
+
+MEGABYTE = 2**20
+WARM = 0.25
+"""Of the run, after which memory has to stay."""
+
+
+def memory():
+    """Of this process (MB)."""
+    gc.collect()
+    return psutil.Process().memory_info().rss / MEGABYTE
+
+
+def play(env, seed, rng):
+    """An episode with random actions; how many steps, and the last observation."""
+    env.reset(seed=seed)
+    for step in range(10_000):
+        observation, _, terminated, *_ = env.step(rng.uniform(-1.0, 1.0, 3).astype(np.float32))
+        if terminated:
+            return step + 1, observation
+    raise AssertionError("an episode without end")
+
+
+@pytest.mark.fault("steps in a row")
+def test_memory_stays_over_many_steps(many):
+    env = gymnasium.make("ICubJump-v1", randomization="hard", jump_height=(0.04, 0.06))
+    wanted, steps, seed, warm = many(5_000, 2_000_000), 0, 0, None
+    _, first = play(env, 0, np.random.default_rng(0))
+    while steps < wanted:
+        seed += 1
+        steps += play(env, seed, np.random.default_rng(seed))[0]
+        if warm is None and steps > WARM * wanted:
+            warm = memory()
+    grown = memory() - warm
+    _, last = play(env, 0, np.random.default_rng(0))
+    np.testing.assert_array_equal(last, first)
+    assert grown < 20.0

@@ -1,0 +1,42 @@
+"""NaN and absurd numbers anywhere in the state or the model: the episode ends, the next one is clean."""
+
+import math
+
+import numpy as np
+import pytest
+
+from icub_jump_env.env import ICubJumpEnv
+
+ABSURD = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e11, 1e6)
+STATE = ("qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart")
+MODEL = ("body_mass", "body_inertia", "dof_damping", "dof_armature", "geom_friction", "jnt_range")
+ACTION = np.zeros(3, np.float32)
+
+
+@pytest.mark.fault("NaN and absurd numbers in state and model")
+@pytest.mark.parametrize(
+    "version",
+    [{}, {"estimator": "imu", "flight": "feedback", "landing": "feedback"}],
+    ids=["v0", "v1"],
+)
+def test_absurd_numbers_end_the_episode_and_leave_no_trace(many, rng, version):
+    env = ICubJumpEnv(**version)
+    clean = [env.reset(seed=0)[0], *(env.step(ACTION)[0] for _ in range(20))]
+    for _ in range(many(20, 2000)):
+        env.reset(seed=0)
+        for _ in range(rng.integers(1, 60)):
+            env.step(ACTION)
+        owner = env.data if rng.random() < 0.5 else env.model
+        values = getattr(owner, rng.choice(STATE if owner is env.data else MODEL))
+        kept = values.copy()
+        values.flat[rng.integers(values.size)] = rng.choice(ABSURD)
+        for _ in range(300):
+            observation, reward, terminated, *_ = env.step(ACTION)
+            assert np.isfinite(observation).all()
+            assert math.isfinite(reward)
+            if terminated:
+                break
+        assert terminated
+        values[:] = kept
+    again = [env.reset(seed=0)[0], *(env.step(ACTION)[0] for _ in range(20))]
+    np.testing.assert_array_equal(again, clean)
