@@ -7,7 +7,6 @@ import io
 import itertools
 import json
 import re
-import shutil
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -34,7 +33,6 @@ from icub_jump_env.simulation.actuators.motors import DCMotor
 
 CONFIG = JumpConfig.of(stand_time=0.1, agent_frequency=10.0)  # few pictures in the videos
 QUIET = Console(file=io.StringIO())
-CHROMIUM, CHROMEDRIVER = "/usr/bin/chromium", "/usr/bin/chromedriver"
 MOMENTS = ["Crouch", "Take-off", "Apex", "First impact", "Stands"]
 LOADED_FROM = ("src", "href", "poster", "srcset", "data", "action", "xlink:href", "background")
 
@@ -315,27 +313,6 @@ def test_refuses_before_any_work_what_one_controller_cannot_do(idle, pictures, t
     only_torque = JumpConfig.of(controller="torque", agent_frequency=500.0)
     with pytest.raises(ConfigError, match="agent_frequency"):
         report.write_report(tmp_path, only_torque, 0, QUIET)
-
-
-@pytest.fixture(scope="session")
-def browser(tmp_path_factory):
-    webdriver = pytest.importorskip("selenium.webdriver")
-    for program in (CHROMIUM, CHROMEDRIVER):
-        if shutil.which(program) is None:
-            pytest.skip(f"no {program}")
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for switch in (
-        "headless=new", "no-sandbox", "disable-gpu", "disable-dev-shm-usage", "no-first-run",
-        "disable-background-networking", "disable-component-update", "disable-sync",
-        f"user-data-dir={tmp_path_factory.mktemp('chromium')}",
-    ):  # fmt: skip
-        options.add_argument(f"--{switch}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    service = webdriver.ChromeService(CHROMEDRIVER)
-    driver = webdriver.Chrome(options=options, service=service)
-    yield driver
-    driver.quit()
 
 
 @pytest.mark.parametrize("width", [390, 1280])

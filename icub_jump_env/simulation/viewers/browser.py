@@ -31,6 +31,14 @@ _PATIENCE = 10.0
 """Longest time (s) until the server answers for the first time."""
 
 _Process = Callable[[Any, Request], Response | None]
+_Answer = Callable[[Any, Request, Response], Response | None]
+
+_FOR_ITS_PAGE = {
+    "Access-Control-Allow-Origin": None,
+    "Content-Security-Policy": "frame-ancestors 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+"""Headers of all answers; None: without it."""
 
 
 class Gate:
@@ -82,6 +90,21 @@ class Gate:
         return any(secrets.compare_digest(t.encode(), self._token.encode()) for t in given)
 
 
+def _kept_from_others(process: _Answer) -> _Answer:
+    """``process``, whose answers no page of another port may show or load: cookies are the same there."""
+
+    def checked(connection: Any, request: Request, response: Response) -> Response:
+        response = process(connection, request, response) or response
+        for name, value in _FOR_ITS_PAGE.items():
+            if name in response.headers:  # Studio lets in everybody, and assigning adds a line
+                del response.headers[name]
+            if value is not None:
+                response.headers[name] = value
+        return response
+
+    return checked
+
+
 def _refusal() -> Response:
     body = b"forbidden: open the address that the program printed\n"
     headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body))})
@@ -98,11 +121,17 @@ _serve = web_server.serve
 
 
 def _serve_gated(
-    *arguments: Any, sock: socket.socket, process_request: _Process, **options: Any
+    *arguments: Any,
+    sock: socket.socket,
+    process_request: _Process,
+    process_response: _Answer,
+    **options: Any,
 ) -> Any:
     if isinstance(sock, _GatedSocket):
         process_request = sock.gate.before(process_request)
-    return _serve(*arguments, sock=sock, process_request=process_request, **options)
+        process_response = _kept_from_others(process_response)
+    options |= {"process_request": process_request, "process_response": process_response}
+    return _serve(*arguments, sock=sock, **options)
 
 
 # Studio has no place for it. Whether it works is tried out before a viewer is used.
