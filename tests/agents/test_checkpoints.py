@@ -231,6 +231,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.fault("damaged files")
 def test_the_previous_one_is_used_if_the_newest_is_damaged(folder, damage):
     suffix, spoil = DAMAGES[damage]
     spoil(folder / f"checkpoint-000005{suffix}")
@@ -274,6 +275,7 @@ CONTENTS = {
 
 
 @pytest.mark.parametrize("content", CONTENTS)
+@pytest.mark.fault("damaged files")
 def test_the_previous_one_is_used_if_the_newest_is_none(folder, content):
     changes, message = CONTENTS[content]
     rewrite(folder, **changes)
@@ -290,6 +292,7 @@ def test_one_called_by_another_number_is_passed_over(folder):
     assert "number=5 is not allowed: 6, as the file is called" in said[0]
 
 
+@pytest.mark.fault("damaged files")
 def test_one_that_is_too_large_is_passed_over(folder, monkeypatch):
     size = (folder / "checkpoint-000005.safetensors").stat().st_size
     rewrite(folder, tensors={"policy.large": np.zeros(99, np.float32)})
@@ -299,6 +302,7 @@ def test_one_that_is_too_large_is_passed_over(folder, monkeypatch):
     assert f"larger than {size} bytes" in said[0]
 
 
+@pytest.mark.fault("damaged files")
 def test_all_damaged_is_an_error_that_names_them(folder):
     for path in folder.glob("*.safetensors"):
         truncate(path)
@@ -306,6 +310,7 @@ def test_all_damaged_is_an_error_that_names_them(folder):
         load_latest(folder, pytest.fail)
 
 
+@pytest.mark.fault("full disk")
 def test_a_full_disk_keeps_the_previous_ones(run, folder, monkeypatch):
     before = written(folder)
     sync = os.fsync
@@ -353,6 +358,7 @@ def test_another_architecture_is_refused(envs, folder):
         {"betas": [0.9, float("inf")]},
     ],
 )
+@pytest.mark.fault("damaged files")
 def test_one_made_by_hand_that_lacks_something_is_refused(envs, folder, change):
     checkpoint = load_latest(folder, pytest.fail)
     (group,) = checkpoint.param_groups

@@ -82,6 +82,7 @@ CONTENTS = {
 
 
 @pytest.mark.parametrize("content", CONTENTS)
+@pytest.mark.fault("hostile options")
 def test_another_file_is_refused(tmp_path, content):
     text, message = CONTENTS[content]
     file = tmp_path / "options.json"

@@ -143,6 +143,7 @@ def test_a_run_that_goes_on_with_other_code_says_so(finished, monkeypatch, capsy
     assert capsys.readouterr().err.startswith("run was begun with other code: ")
 
 
+@pytest.mark.fault("killed trainings")
 def test_a_killed_run_ends_as_if_it_had_not_been(whole, monkeypatch):
     """Where it hurts most: evaluated and written, but not yet in a checkpoint."""
     program = """
@@ -198,6 +199,7 @@ def test_an_interrupted_run_says_how_to_go_on_and_does(whole, monkeypatch, capsy
     assert results(RUN) == results(whole)
 
 
+@pytest.mark.fault("damaged files")
 def test_a_run_goes_on_from_the_checkpoint_before_a_damaged_one(
     whole, finished, monkeypatch, capsys
 ):
@@ -232,6 +234,7 @@ def error(err):
     return line
 
 
+@pytest.mark.fault("full disk")
 def test_a_full_disk_is_named_and_spares_the_checkpoints_before(whole, monkeypatch, capsys):
     sync = os.fsync
 
@@ -250,6 +253,7 @@ def test_a_full_disk_is_named_and_spares_the_checkpoints_before(whole, monkeypat
     assert not list(RUN.glob("*.part"))
 
 
+@pytest.mark.fault("killed trainings")
 def test_a_dead_worker_ends_the_run_and_leaves_no_process(monkeypatch, capsys):
     def kill(run):
         os.kill(run.model.get_env().remotes[1].process.pid, signal.SIGKILL)

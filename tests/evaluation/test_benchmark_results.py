@@ -78,6 +78,7 @@ def replaced(path, change):
         (lambda c: c.pop("sha256"), "hash"),
     ],
 )
+@pytest.mark.fault("hostile results")
 def test_a_changed_file_is_refused(tmp_path, change, problem):
     result(*[90] * 10).write(tmp_path / "r.json")
     replaced(tmp_path / "r.json", change)
@@ -98,6 +99,7 @@ def test_a_changed_file_is_refused(tmp_path, change, problem):
         (lambda c: c["scores"]["low"].update(rise="high"), "rise"),
     ],
 )
+@pytest.mark.fault("hostile results")
 def test_a_file_with_a_true_hash_may_still_be_no_result(tmp_path, change, problem):
     result(*[90] * 10).write(tmp_path / "r.json")
     content = json.loads((tmp_path / "r.json").read_text())
@@ -113,6 +115,7 @@ def test_a_file_with_a_true_hash_may_still_be_no_result(tmp_path, change, proble
     "content",
     ["", "[]", "{}", '{"benchmark": 1}', "[" * 1000, "\x00", "9" * 5000, '"' + "x" * 2**20],
 )
+@pytest.mark.fault("hostile results")
 def test_what_is_no_result_is_refused_with_its_name(tmp_path, content):
     (tmp_path / "r.json").write_text(content)
     with pytest.raises(FileError, match=r"r\.json"):

@@ -118,6 +118,7 @@ def test_it_does_not_start_where_others_could_connect(plain_model, browser_scree
 
 
 @serves
+@pytest.mark.fault("foreign pages")
 def test_the_page_is_shown_to_those_who_have_its_address(plain_model, browser_screen):
     with contextlib.closing(browser_screen(plain_model)) as screen:
         url = urllib.parse.urlsplit(screen.address)
@@ -149,6 +150,7 @@ def test_the_page_is_shown_to_those_who_have_its_address(plain_model, browser_sc
 
 
 @serves
+@pytest.mark.fault("foreign pages")
 def test_streams_are_for_the_page_alone_and_uploads_for_nobody(plain_model, browser_screen):
     client = pytest.importorskip("websockets.sync.client")
     refusal = pytest.importorskip("websockets.exceptions").InvalidStatus
@@ -202,7 +204,7 @@ Promise.all(tries).then(() => { document.title = JSON.stringify(found); });
 
 
 @serves
-@pytest.mark.fault("a page of another origin, in a real browser that has been let in")
+@pytest.mark.fault("foreign pages")
 def test_a_foreign_page_gets_nothing(plain_model, browser_screen, browser, tmp_path):
     from selenium.webdriver.support.wait import WebDriverWait
 

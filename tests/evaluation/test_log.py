@@ -86,6 +86,7 @@ class TestLog:
         assert path.read_bytes() == before
 
     @pytest.mark.parametrize("content", ["", "nonsense\n", "[1]\n", '{"a": 1}\n{"b": 2}\n'])
+    @pytest.mark.fault("damaged files")
     def test_another_file_is_refused_and_kept(self, tmp_path, content):
         path = tmp_path / "notes.txt"
         path.write_text(content)
@@ -104,6 +105,7 @@ class TestLog:
             {"jump_height": None}, {"jump_height": [0.04, 0.06]}, {"reward": None},
         ],
     )  # fmt: skip
+    @pytest.mark.fault("damaged files")
     def test_damaged_episodes_are_dropped(self, tmp_path, change):
         """Whether the line was changed, or written so with a checksum that fits."""
         log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
@@ -120,6 +122,7 @@ class TestLog:
             assert (again.damaged, again.episodes) == (2, {0: episode(0)})
             assert log.path.read_text() == f"{header}\n{line}\n"
 
+    @pytest.mark.fault("damaged files")
     def test_one_changed_character_is_noticed_wherever_it_is(self, tmp_path):
         log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
         log.append(episode(0))
@@ -135,6 +138,7 @@ class TestLog:
             with pytest.raises(ConfigError, match=r"a log of eval\.py"):
                 EpisodeLog(log.path, self.header, resume=True)
 
+    @pytest.mark.fault("damaged files")
     def test_a_line_nested_without_end_is_dropped(self, tmp_path):
         log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=False)
         for levels in (500, 100_000):
@@ -184,6 +188,7 @@ if __name__ == "__main__":
     ("jobs", "signals"),
     [("1", [signal.SIGINT]), ("2", [signal.SIGTERM, signal.SIGKILL])],
 )
+@pytest.mark.fault("killed evaluations")
 def test_killed_and_resumed_equals_uninterrupted(tmp_path, jobs, signals):
     """The real thing: signals to a process, and the files compared byte for byte."""
     program = tmp_path / "stops.py"

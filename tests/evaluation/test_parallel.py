@@ -75,6 +75,7 @@ def test_results_come_in_the_order_of_the_work(quiet):
     assert [episode.seed for episode in run_all(work, 2, quiet)] == [7, 0, 1, 2]
 
 
+@pytest.mark.fault("killed workers")
 def test_a_killed_worker_ends_the_run_with_one_error(capfd):
     results = run_jobs(episodes(JUMP, 1000), jobs=2)
     finished = [next(results) for _ in range(3)]
@@ -149,6 +150,7 @@ def test_ctrl_c_leaves_no_process_and_no_noise(program):
     assert all_end(started)
 
 
+@pytest.mark.fault("killed workers")
 def test_a_killed_run_leaves_no_process(program):
     started = workers(program.pid)
     assert len(started) == 2

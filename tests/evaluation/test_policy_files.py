@@ -60,6 +60,7 @@ class TestNames:
         names = [contender.name for contender in read_contenders(words)]
         assert names == ["baseline", "first-best", "second-best", "last"]
 
+    @pytest.mark.fault("hostile policies")
     def test_nothing_in_a_name_reaches_the_terminal(self, capsys, tmp_path):
         file = save_constant(tmp_path / "red\x1b[31m\n[bold]\x07.safetensors", 0.1, 0, 0)
         code, out, err = evaluate(capsys, "--policy", file, *SHORT)
@@ -70,6 +71,7 @@ class TestNames:
         message = refusal(capsys, "--policy", file)
         assert r"red\x1b[31m [bold]\x07.json: not a JSON object" in message
 
+    @pytest.mark.fault("hostile policies")
     def test_nothing_in_a_card_reaches_the_terminal(self, capsys, tmp_path):
         file = save_constant(tmp_path / "mine.safetensors", 0.1, 0, 0)
         card = json.loads(file.with_suffix(".json").read_text())

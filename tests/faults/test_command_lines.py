@@ -61,7 +61,7 @@ def lines(draw):
     return command, words
 
 
-@pytest.mark.fault("command lines drawn at random")
+@pytest.mark.fault("command lines")
 @given(lines())
 def test_any_command_line_is_taken_or_refused_in_one_line(line):
     command, words = line

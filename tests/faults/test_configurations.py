@@ -68,7 +68,7 @@ def fields_of(kind, *more):
     )
 
 
-@pytest.mark.fault("configurations drawn at random")
+@pytest.mark.fault("configurations")
 @given(fields_of(JumpConfig, Shortcuts))
 def test_any_configuration_is_taken_or_refused(keywords):
     refusal = None
@@ -83,7 +83,7 @@ def test_any_configuration_is_taken_or_refused(keywords):
         assert len(refusal) <= 2000
 
 
-@pytest.mark.fault("environments of configurations drawn at random")
+@pytest.mark.fault("configurations that are taken")
 @given(fields_of(JumpConfig, Shortcuts))
 def test_what_is_taken_jumps(keywords):
     with contextlib.suppress(ConfigError):

@@ -7,7 +7,7 @@ import numpy as np
 import psutil
 import pytest
 
-from icub_jump_env.simulation.opengl import has_display  # noqa: F401
+from icub_jump_env.errors import MissingDependencyError
 
 MEGABYTE = 2**20
 WARM = 0.25
@@ -30,7 +30,7 @@ def play(env, seed, rng):
     raise AssertionError("an episode without end")
 
 
-@pytest.mark.fault("steps in a row")
+@pytest.mark.fault("soak")
 def test_memory_stays_over_many_steps(many):
     env = gymnasium.make("ICubJump-v1", randomization="hard", jump_height=(0.04, 0.06))
     wanted, steps, seed, warm = many(5_000, 2_000_000), 0, 0, None
@@ -44,3 +44,21 @@ def test_memory_stays_over_many_steps(many):
     _, last = play(env, 0, np.random.default_rng(0))
     np.testing.assert_array_equal(last, first)
     assert grown < 20.0
+
+
+@pytest.mark.fault("soak")
+def test_memory_stays_over_many_renderers(many):
+    """Each opens a graphics context, draws and closes it."""
+    wanted, warm = many(6, 500), None
+    for cycle in range(wanted):
+        env = gymnasium.make("ICubJump-v1", render_mode="rgb_array", width=160, height=120)
+        try:
+            env.reset(seed=0)
+            picture = env.render()
+        except MissingDependencyError as error:
+            pytest.skip(str(error))
+        env.close()
+        assert picture.std() > 1.0
+        if cycle == max(3, wanted // 4):
+            warm = memory()
+    assert memory() - warm < 50.0

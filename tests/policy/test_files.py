@@ -152,6 +152,7 @@ def test_a_card_with_another_hash_or_none(path, digest):
         (b'{"a": "' + b"x" * MAX_CARD_SIZE + b'"}', "larger than 1048576 bytes"),
     ],
 )
+@pytest.mark.fault("hostile policies")
 def test_cards_that_are_something_else(path, text, match):
     path.with_suffix(".json").write_bytes(text)
     assert refused(path, match).path.endswith(".json")
@@ -186,6 +187,7 @@ def entry(dtype="F32", shape=(1,), size=4):
         b"(lp0\n.", pickle.dumps({"a": [1.0]}),
     ],
 )  # fmt: skip
+@pytest.mark.fault("hostile policies")
 def test_other_files_with_the_right_hash(path, content):
     path.write_bytes(content)
     digest = hashlib.sha256(content).hexdigest()
@@ -204,6 +206,7 @@ class Intruder:
 
 
 @pytest.mark.parametrize("zipped", [False, True])
+@pytest.mark.fault("hostile policies")
 def test_a_pickle_is_not_executed(path, zipped):
     trace = path.parent / "trace"
     pickle.loads(pickle.dumps(Intruder(trace)))
@@ -221,6 +224,7 @@ def test_a_pickle_is_not_executed(path, zipped):
     assert not trace.exists()
 
 
+@pytest.mark.fault("hostile policies")
 def test_large_files_are_not_read(path):
     assert load_tensors(path, max_size=path.stat().st_size)
     with pytest.raises(PolicyFileError, match="larger than 100 bytes"):
@@ -282,6 +286,7 @@ def test_a_folder_that_cannot_be_synced_is_no_error(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("failing", [0, 1])
 @pytest.mark.parametrize("call", ["fsync", "write"])
+@pytest.mark.fault("full disk")
 def test_a_full_disk_keeps_the_old_pair(path, monkeypatch, failing, call):
     """At the first file or at the second."""
     before, calls = contents(path.parent), []

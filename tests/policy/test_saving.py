@@ -154,6 +154,7 @@ def test_only_these_policies_can_be_saved(tmp_path):
         ("replay", {"action_scale": 0.5}),
     ],
 )
+@pytest.mark.fault("hostile policies")
 def test_a_card_that_contradicts_the_arrays(tmp_path, name, change):
     path = tmp_path / "jump.safetensors"
     save_policy(path, POLICIES[name], **DETAILS)
@@ -164,6 +165,7 @@ def test_a_card_that_contradicts_the_arrays(tmp_path, name, change):
         load_policy(path)
 
 
+@pytest.mark.fault("hostile policies")
 def test_forged_arrays_are_refused(path):
     original = load(path.read_bytes())
     name = next(iter(original))
@@ -198,6 +200,7 @@ def test_forged_arrays_are_refused(path):
         max_leaves=6,
     ),
 )
+@pytest.mark.fault("hostile policies")
 def test_hostile_cards_lead_to_typed_errors(tmp_path_factory, key, value):
     path = tmp_path_factory.mktemp("policy") / "jump.safetensors"
     save_policy(path, POLICIES["network"], **DETAILS)
