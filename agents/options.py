@@ -86,18 +86,18 @@ class PPOOptions:
         ramp: Updates during which the actions grow to their scale.
     """
 
-    episodes: int = 128
-    batch_size: int = 1024
+    episodes: int = 64
+    batch_size: int = 256
     epochs: int = 10
     learning_rate: float = 5e-4
     gamma: float = 0.999
     gae_lambda: float = 0.98
     clip_range: float = 0.2
-    target_kl: float = 0.03
+    target_kl: float = 0.04
     hidden: tuple[int, ...] = (64, 64)
     critic_hidden: tuple[int, ...] = (64, 64)
-    log_std: tuple[float, float] = (-1.7, -2.5)
-    warmup: int = 2
+    log_std: tuple[float, float] = (-1.0, -2.3)
+    warmup: int = 1
     action_scale: float = 1.0
     ramp: int = 0
 
@@ -162,12 +162,12 @@ class TrainOptions:
     inputs: Inputs = "all"
     axes: tuple[AxisName, ...] = ()
     critic: Critic = "observation"
-    timesteps: int = 100_000
+    timesteps: int = 150_000
     seed: int = 0
     seeds: str | None = None
     cluster: str | None = None
     jobs: int = 8
-    checkpoint_every: int = 8
+    checkpoint_every: int = 12
     evaluation_episodes: int = len(SELECTION)
     run: Path | None = None
     resume: Path | None = None

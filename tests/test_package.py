@@ -1,8 +1,10 @@
 """The package as a whole: layers, import costs, and the installed wheel."""
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -219,3 +221,30 @@ def test_installed_wheel_jumps(site):
         "assert info['is_success']\n"
     )
     run_installed(site, program)
+
+
+def pinned(name):
+    """Versions in a file of requirements, by package."""
+    text = (REPOSITORY / name).read_text()
+    return dict(re.findall(r"^([\w.-]+)==([^ ;\\\n]+)", text, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ("file", "without"), [("locked.txt", ()), ("locked-tests.txt", ("torch",))]
+)
+def test_each_locked_version_is_the_tested_one_and_has_its_hash(file, without):
+    locked, wanted = pinned(file), pinned("constraints.txt")
+    assert locked.items() >= {(name, wanted[name]) for name in locked.keys() & wanted.keys()}
+    entries = re.split(r"^(?=[\w.-]+==)", (REPOSITORY / file).read_text(), flags=re.MULTILINE)[1:]
+    assert len(entries) >= len(locked) > 30
+    assert all("--hash=sha256:" in entry for entry in entries)
+    assert not locked.keys() & set(without)
+
+
+def test_all_that_is_asked_for_is_locked():
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    tests = [need for name, needs in extras.items() if name != "planning" for need in needs]
+    for file, needs in (("locked.txt", []), ("locked-tests.txt", tests)):
+        named = {re.match(r"[\w.-]+", need)[0] for need in (*project["dependencies"], *needs)}
+        assert named - {"torch"} <= pinned(file).keys()
