@@ -1,6 +1,7 @@
 """How training seeds and ablations differ, on episodes that no training has seen.
 
     python -m experiments.ablations --jobs 2
+    python -m experiments.ablations --task v0 --jobs 2
 
 prints one row per kind of training in experiments/runs: what it reaches and what it
 gains over the baseline of its task, with the law where the task has it. An interrupted
@@ -14,8 +15,10 @@ import math
 import re
 import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +27,7 @@ from rich.table import Table
 
 from experiments.seeds import TEST
 from experiments.shipped import CURVE_SUFFIX, RUNS, judged_config
-from icub_jump_env.checks import check_count
+from icub_jump_env.checks import check_choice, check_count
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
@@ -36,8 +39,11 @@ from icub_jump_env.evaluation.report.output import new_table, show
 from icub_jump_env.evaluation.statistics.intervals import CONFIDENCE, interquartile_mean
 
 _NAME = re.compile(r"(?P<kind>[\w-]+)-seed\d+")
-HEADLINES = (*CONTROLLERS, *(f"disturbed-{controller}" for controller in CONTROLLERS))
-"""Kinds of training that others are ablations of."""
+Task = Literal["v0", "disturbed"]
+HEADLINES: Mapping[Task, tuple[str, ...]] = MappingProxyType(
+    {"v0": CONTROLLERS, "disturbed": tuple(f"disturbed-{name}" for name in CONTROLLERS)}
+)
+"""Kinds of training that others are ablations of, by task."""
 
 _EPISODES = 200
 _RESAMPLES = 5000
@@ -50,14 +56,17 @@ class AblationOptions:
     """Compare kinds of training.
 
     Attributes:
+        task: Of which task: that of disturbed worlds, or that of ICubJump-v0.
         episodes: Of each policy.
         jobs: Processes that work in parallel.
     """
 
+    task: Task = "disturbed"
     episodes: int = _EPISODES
     jobs: int = 1
 
     def __post_init__(self) -> None:
+        check_choice("task", self.task, tuple(HEADLINES))
         check_count("episodes", self.episodes, 1, len(TEST))
         check_count("jobs", self.jobs, 1, unit="processes")
 
@@ -86,10 +95,10 @@ def compare_trainings(options: AblationOptions) -> None:
         "gain",
         "min",
     )
-    for headline in (kind for kind in HEADLINES if kind in kinds):
+    for headline in (kind for kind in HEADLINES[options.task] if kind in kinds):
         baseline = _jumps(judged_config(kinds[headline][0]), BASELINE, options, progress)
         _add(table, f"{headline}, baseline", baseline)
-        for kind in sorted(kind for kind in kinds if headline_of(kind) == headline):
+        for kind in sorted(kind for kind in kinds if kind.startswith(headline)):
             members = kinds[kind]
             jumps = np.stack(
                 [_jumps(judged_config(member), member, options, progress) for member in members]
@@ -103,11 +112,6 @@ def compare_trainings(options: AblationOptions) -> None:
         "seed: over the episodes of one training alone, so another seed may well differ by more"
     )
     show(console, table)
-
-
-def headline_of(kind: str) -> str | None:
-    """The kind of training of which this one is an ablation, or itself."""
-    return next((name for name in HEADLINES if kind.startswith(name)), None)
 
 
 def _jumps(
