@@ -15,12 +15,12 @@ CLIENTS = REPOSITORY / "examples" / "clients"
 RETURN = r"\d+ steps learned, return -?\d+\.\d ± \d+\.\d"
 QUICK = {
     "checkers": ("stable_baselines3", "no error and no warning"),
-    "gymnasium_make_vec": ("gymnasium", "100 steps of 2 environments; .*"),
+    "gymnasium_make_vec": ("gymnasium", "300 steps of 2 environments: .*"),
     "sb3_contrib_recurrent_ppo": ("sb3_contrib", RETURN),
     "sb3_ppo": ("stable_baselines3", RETURN),
     "sb3_sac": ("stable_baselines3", RETURN),
     "skrl_ppo": ("skrl", "1024 steps learned"),
-    "torchrl_gym_env": ("torchrl", r"1024 steps collected, [1-9] episodes ended"),
+    "torchrl_gym_env": ("torchrl", r"1024 steps collected, [1-9]\d* episodes ended"),
 }
 """The module that each imports, and its last line."""
 ELSEWHERE = {"gymnasium_record_video", "minari_record", "rl_zoo3_train_enjoy", "rllib_ppo"}

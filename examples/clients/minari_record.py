@@ -15,6 +15,7 @@ with TemporaryDirectory() as folder:
     import minari
 
     env = minari.DataCollector(gymnasium.make("icub_jump_env:ICubJump-v1", **TASK))
+    env.action_space.seed(0)
     for seed in range(3):
         env.reset(seed=seed)
         ended = False

@@ -14,7 +14,7 @@ if __name__ == "__main__":  # the processes import this file
     envs = make_vec_env(
         "icub_jump_env:ICubJump-v1", n_envs=2, env_kwargs=TASK, vec_env_cls=SubprocVecEnv
     )
-    envs = VecNormalize(envs)
+    envs = VecNormalize(envs, gamma=0.999)
     model = PPO("MlpPolicy", envs, n_steps=512, gamma=0.999, seed=0).learn(1024)
     envs.training = envs.norm_reward = False
     mean, deviation = evaluate_policy(model, envs, n_eval_episodes=4)

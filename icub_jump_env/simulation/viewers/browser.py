@@ -45,8 +45,9 @@ class Gate:
     """Lets in who knows the address that was printed, and takes no files.
 
     The address holds a token; the page's own requests, which lack it, carry the cookie that
-    the page brought. Neither other users nor other sites' pages have either. Requests by
-    another name of this machine, or from another site's page, are refused in any case.
+    the page brought. Pages of other sites have neither. Requests by another name of this machine, or
+    from another site's page, are refused in any case. A browser sends the cookie to all ports of
+    this machine: whoever opens the page of another user's server there gives it away.
 
     Attributes:
         address: The page, with the token.
