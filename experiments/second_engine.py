@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -58,13 +58,14 @@ from experiments.seeds import ENGINE
 from icub_jump_env.checks import check_count
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
+from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
 from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, PERCENT, seeds
 from icub_jump_env.evaluation.report.output import new_table, show
-from icub_jump_env.evaluation.statistics.difference import Difference
+from icub_jump_env.evaluation.statistics.difference import Difference, holm_corrected, in_words
 from icub_jump_env.policy import BASELINE, Policy, load_policy
-from icub_jump_env.robot.mujoco_model import FLOOR_GEOM, sole_geom
+from icub_jump_env.robot.mujoco_model import BLOCK_GEOMS, FLOOR_GEOM, sole_geom
 from icub_jump_env.robot.robot import Robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.versions import VERSIONS
@@ -73,8 +74,11 @@ Array = NDArray[np.float64]
 
 RUBBER_MODULUS, RUBBER_THICKNESS = 1e6, 0.005
 """Of what covers the floor (Pa, m)."""
-DISSIPATION = 1.0
-"""Of the rubber, after Hunt and Crossley (s/m)."""
+RELAXATION_TIME = 0.005
+"""Of the rubber, by which a contact is damped (s), half of it from each shape."""
+INFINITE = 1e6
+"""A coefficient of friction that leaves the other one's in the harmonic mean."""
+LAW, POLICY = "law, 5 cm, disturbed", "policy, 5 cm, disturbed"
 
 
 class Twin:
@@ -175,7 +179,7 @@ class Twin:
     def _add_body(self, model: mujoco.MjModel, number: int) -> Any:
         mass, inertia = model.body_mass[number], SpatialInertia.Zero()
         if mass > 0.0:
-            axes = RotationMatrix(Quaternion(model.body_iquat[number]))
+            axes = _transform(np.zeros(3), model.body_iquat[number]).rotation()
             principal = RotationalInertia(*model.body_inertia[number])
             inertia = SpatialInertia.MakeFromCentralInertia(
                 mass, model.body_ipos[number], principal.ReExpress(axes)
@@ -214,13 +218,12 @@ class Twin:
 
     def _add_shape(self, model: mujoco.MjModel, geom: int) -> GeometryId:
         properties, name = ProximityProperties(), model.geom(geom).name
-        # MuJoCo takes the larger coefficient of two shapes, Drake the harmonic mean.
-        friction = max(model.geom_friction[geom, 0], model.geom(FLOOR_GEOM).friction[0])
-        AddContactMaterial(
-            dissipation=DISSIPATION,
-            friction=CoulombFriction(friction, friction),
-            properties=properties,
-        )
+        # MuJoCo takes the larger coefficient of two shapes, Drake 2 a b / (a + b).
+        friction = max(model.geom_friction[geom, 0], model.geom(FLOOR_GEOM).friction[0]) / 2.0
+        if name == FLOOR_GEOM:
+            friction = INFINITE
+        AddContactMaterial(friction=CoulombFriction(friction, friction), properties=properties)
+        properties.AddProperty("material", "relaxation_time", RELAXATION_TIME / 2.0)
         if name == FLOOR_GEOM:
             AddCompliantHydroelasticPropertiesForHalfSpace(
                 RUBBER_THICKNESS, RUBBER_MODULUS, properties
@@ -261,8 +264,16 @@ class DrakePhysics(Physics):
 
     def reset(self, qpos: Array) -> None:
         """Put the robot at rest, in the world that was drawn."""
+        if set(BLOCK_GEOMS) & {self.model.geom(k).name for k in range(self.model.ngeom)}:
+            raise ConfigError("randomization", "blocks", "level ground: Drake's does not change")
         super().reset(qpos)
         self._twin = Twin(self.model)
+
+    def start_from_rest(self) -> None:
+        """Stop all motion and set the time to zero."""
+        contacts = self._twin.contacts()
+        super().start_from_rest()
+        self._show(contacts)
 
     def step(self) -> None:
         """Advance by one physics step."""
@@ -271,22 +282,25 @@ class DrakePhysics(Physics):
         twin.set_state(data.qpos, data.qvel)
         torque = data.actuator_force + self.joint_force
         twin.step(torque, self._chest, self.chest_force, model.body_ipos[self._chest])
-        contacts = twin.contacts()
+        self._show(twin.contacts())
+        data.qpos[:], data.qvel[:] = twin.state()
+        data.time += model.opt.timestep
+        self.note(1)
+
+    def _show(self, contacts: Mapping[str, tuple[Array, Array]]) -> None:
+        """Write the forces where MuJoCo's sensors have theirs."""
         for sole, slots in self._soles.items():
             slots[:] = 0.0
             if sole in contacts:
                 slots[:] = np.concatenate(([1.0], *contacts[sole]))
         self._floor[0] = len(contacts)
         self._floor[1:4] = sum((force for force, _ in contacts.values()), np.zeros(3))
-        data.qpos[:], data.qvel[:] = twin.state()
-        data.time += model.opt.timestep
-        self.note(1)
 
 
 class DrakeEnv(ICubJumpEnv):
     """The environment, in Drake."""
 
-    engine = DrakePhysics
+    _engine = DrakePhysics
 
 
 @dataclass(frozen=True)
@@ -316,8 +330,8 @@ def rows(controller: str) -> dict[str, tuple[JumpConfig, Policy]]:
     return {
         "4 cm commanded, full": (command, BASELINE),
         "plan of 6 cm, full": (plan, BASELINE),
-        "law, 5 cm, disturbed": (felt, BASELINE),
-        "policy, 5 cm, disturbed": (felt, policy),
+        LAW: (felt, BASELINE),
+        POLICY: (felt, policy),
     }
 
 
@@ -325,9 +339,9 @@ def jump(
     config: JumpConfig, policy: Policy, drake: bool, of_seeds: Sequence[int]
 ) -> list[Episode]:
     """Episodes in one of the simulators."""
-    logging.getLogger("drake").setLevel(logging.ERROR)  # it warns of half spaces of jelly
-    slow = config.replace(physics_loop="python", early_end=False)
-    env = DrakeEnv(**vars(slow)) if drake else make_env(slow)
+    logging.getLogger("drake").setLevel(logging.ERROR)  # it warns of half spaces and soft bodies
+    whole = config.replace(early_end=False)
+    env = DrakeEnv(**vars(whole)) if drake else make_env(whole)
     return [run_episode(env, seed, policy) for seed in of_seeds]
 
 
@@ -336,10 +350,7 @@ def cells(ours: Sequence[Episode], theirs: Sequence[Episode]) -> list[str]:
     added = Difference.of(theirs, ours)
     points, low, high = (PERCENT * value for value in (added.success, *added.success_interval))
     shares = (f"{PERCENT * np.mean([e.is_success for e in es]):.0f}" for es in (ours, theirs))
-    rises = (
-        f"{CM * np.mean([e.jump['flight_height'] or 0.0 for e in es]):.2f}"
-        for es in (ours, theirs)
-    )
+    rises = (f"{CM * np.mean([e.jump['flight_height'] for e in es]):.2f}" for es in (ours, theirs))
     rise, least, most = (CM * value for value in (added.rise, *added.rise_interval))
     return [
         *shares, f"{points:+.1f} ({low:+.1f} to {high:+.1f})",
@@ -355,16 +366,28 @@ def run(options: EngineOptions) -> None:
         "difference", title=f"Success and rise in two simulators, {seeds(chosen)}",
     )  # fmt: skip
     parts = [chosen[k :: options.jobs] for k in range(options.jobs)]
+    compared: dict[str, Difference] = {}
     with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
         for controller in CONTROLLERS:
+            done: dict[str, list[list[Episode]]] = {}
             for name, (config, policy) in rows(controller).items():
-                found = []
+                done[name] = []
                 for drake in (False, True):
                     work = [pool.submit(jump, config, policy, drake, part) for part in parts]
                     every = [episode for part in work for episode in part.result()]
-                    found.append(sorted(every, key=lambda episode: episode.seed))
-                table.add_row(controller, name, *cells(*found))
-    show(Console(), table)
+                    done[name].append(sorted(every, key=lambda episode: episode.seed))
+                table.add_row(controller, name, *cells(*done[name]))
+            for simulator, policy_s, law_s in zip(
+                ("MuJoCo", "Drake"), done[POLICY], done[LAW], strict=True
+            ):
+                compared[f"{controller}, {simulator}, policy against law"] = Difference.of(
+                    policy_s, law_s
+                )
+    console = Console()
+    show(console, table)
+    corrected = holm_corrected(list(compared.values()))
+    for line in in_words(dict(zip(compared, corrected, strict=True))):
+        console.print(line, soft_wrap=True, highlight=False)
 
 
 if __name__ == "__main__":

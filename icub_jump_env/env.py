@@ -99,8 +99,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         "render_modes": ["rgb_array", "human"],
         "render_fps": 100,
     }
-    engine: type[Physics] = Physics
-    """What simulates the world."""
+    _engine: type[Physics] = Physics
 
     def __init__(self, **config: Any) -> None:
         """Build the world and the controllers.
@@ -122,7 +121,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         cfg, self.robot = self.config, self.config.robot_value
         self.action_space = spaces.Box(-1.0, 1.0, (len(cfg.residual.axes),), np.float32)
         self._simulation = Simulation(
-            self.engine(
+            self._engine(
                 self.robot,
                 cfg.timestep,
                 visuals=self.render_mode is not None,
@@ -133,7 +132,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             cfg.sensor_config,
             cfg.randomization_config,
             cfg.command_delay,
-            compiled=cfg.physics_loop == "compiled",
+            compiled=cfg.physics_loop == "compiled" and self._engine is Physics,
         )
         kinematics = FeetFixedKinematics(self.robot)
         self._estimator: Estimator = FeetFixedEstimator(kinematics)
@@ -298,7 +297,8 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._renderer = make_renderer(self._simulation.physics, self.config.rendering)
 
     def _control_tick(self, residual_target: NDArray[np.float64]) -> None:
-        simulation, physics = self._simulation, self._simulation.physics
+        simulation = self._simulation
+        physics = simulation.physics
         tick = self._controller.tick(self._state, physics.data.time, residual_target)
         if tick.report is not None:
             self._report = worse(self._report, tick.report)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from icub_jump_env.control.config import Constraints, LaunchEnd, SolverName
-from icub_jump_env.errors import ConfigError, UnknownFieldError
+from icub_jump_env.errors import ConfigError, UnknownFieldError, shown
 from icub_jump_env.planning.residual import AxisName, ResidualPhases
 from icub_jump_env.simulation.render_config import CameraName, RenderMode
 
@@ -119,9 +119,9 @@ class WithShortcuts(ABC):
         names = [field.name for field in dataclasses.fields(self)]
         for name, value in changes.items():
             if name not in names and name not in PATHS:
+                allowed = f"no such field; the fields are {', '.join([*names, *PATHS])}"
                 # In Python's words, too, which TorchRL looks for.
-                unknown = f"no such field (unexpected keyword argument {name!r})"
-                allowed = f"{unknown}; the fields are {', '.join([*names, *PATHS])}"
+                allowed += f" (unexpected keyword argument {shown(name)})"
                 raise UnknownFieldError(name, value, allowed)
         fields = {name: value for name, value in changes.items() if name in names}
         made = dataclasses.replace(self, **fields)

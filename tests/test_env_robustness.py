@@ -146,6 +146,7 @@ class TestBadInput:
         assert isinstance(refusal.value, UnknownFieldError)
         for name in ("jump_height", "stand_time", "reward", "render_mode"):
             assert name in str(refusal.value)
+        assert "unexpected keyword argument 'wings'" in str(refusal.value)
 
     def test_numpy_values_are_welcome(self):
         env = gymnasium.make(

@@ -15,8 +15,8 @@ if __name__ == "__main__":  # the processes import this file
         "icub_jump_env:ICubJump-v1", n_envs=2, env_kwargs=TASK, vec_env_cls=SubprocVecEnv
     )
     envs = VecNormalize(envs, gamma=0.999)
-    model = SAC("MlpPolicy", envs, gamma=0.999, learning_starts=256, seed=0).learn(600)
+    model = SAC("MlpPolicy", envs, gamma=0.999, learning_starts=100, seed=0).learn(300)
     envs.training = envs.norm_reward = False
-    mean, deviation = evaluate_policy(model, envs, n_eval_episodes=4)
+    mean, deviation = evaluate_policy(model, envs, n_eval_episodes=2)
     envs.close()
-    print(f"600 steps learned, return {mean:.1f} ± {deviation:.1f}")
+    print(f"300 steps learned, return {mean:.1f} ± {deviation:.1f}")

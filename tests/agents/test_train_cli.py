@@ -130,7 +130,7 @@ def test_a_runs_options_are_those_of_another(asked):
         (["--ppo.hidden", "0"], ["hidden", "0", "from 1 to 512"]),
         (["--jump-height", "7"], ["jump_height", "7", "0.01 to 0.15"]),
         (["--axes", "up"], ["axes", "forward", "lateral", "vertical"]),
-        (["--jobs", "7"], ["jobs=7", "divisor of ppo.episodes=128"]),
+        (["--jobs", "7"], ["jobs=7", "divisor of ppo.episodes=64"]),
         (["--render-mode", "human"], ["render_mode", "human"]),
         (["--resume"], ["--resume"]),
         (["--resume", "nowhere"], ["resume", "nowhere", "the folder of a run"]),
@@ -145,7 +145,7 @@ def test_a_runs_options_are_those_of_another(asked):
         (["--run", "run/options.json"], ["run/options.json", "exists"]),
         (["--config", "nowhere"], ["config", "nowhere", "No such file"]),
         (["--run", "x", "--timesteps", "10000000", "--checkpoint-every", "4"],
-         ["checkpoint_every", "4", "at least 5", "500 checkpoints"]),
+         ["checkpoint_every", "4", "at least 9", "500 checkpoints"]),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_in_one_line(refused, run, arguments, words):

@@ -237,6 +237,7 @@ def test_a_foreign_page_gets_nothing(plain_model, browser_screen, browser, tmp_p
             "return [location.protocol, document.querySelectorAll('canvas').length]"
         )
         browser.switch_to.default_content()
+        browser.get_log("browser")  # what was refused, which is no matter of later tests
     assert json.loads(browser.title) == {
         "fetch": "refused",
         "cookie": "refused",
