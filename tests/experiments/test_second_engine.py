@@ -22,8 +22,8 @@ def moving(physics, rng):
     """A model in the air that moves at random, and its twin."""
     model, data = physics.model, physics.data
     model.opt.gravity[:] = rng.normal(size=3)
-    data.qpos[:] = rng.normal(size=model.nq) * 0.2
-    data.qpos[2] = 5.0
+    data.qpos[:7] = (0.0, 0.0, 5.0, *rng.normal(size=4))
+    data.qpos[7:] = physics.robot.crouch  # within the limits, where both are free
     data.qpos[3:7] /= np.linalg.norm(data.qpos[3:7])
     data.qvel[:] = rng.normal(size=model.nv)
     data.ctrl[:] = rng.uniform(-5.0, 5.0, model.nu)
