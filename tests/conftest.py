@@ -41,6 +41,13 @@ def pytest_configure(config):
 
 
 @pytest.fixture
+def only_full(request):
+    """Skip what takes long, or needs a process that does nothing else."""
+    if not request.config.getoption("full"):
+        pytest.skip("with --full")
+
+
+@pytest.fixture
 def many(request, record_property):
     """How many cases to try: quickly, and with --full."""
 

@@ -18,10 +18,8 @@ EVALUATION = (
 
 
 @pytest.fixture
-def often(request, many):
-    """How often, with --full alone: a program takes seconds."""
-    if not request.config.getoption("full"):
-        pytest.skip("with --full")
+def often(only_full, many):
+    """How often: a program takes seconds."""
     return lambda count: range(many(0, count))
 
 
