@@ -29,13 +29,11 @@ settings.load_profile("ci")
 
 
 def pytest_addoption(parser):
-    parser.addoption("--full", action="store_true", help="as many cases as docs/reliability.md")
+    parser.addoption("--full", action="store_true", help="many cases of each fault, for hours")
 
 
 def pytest_configure(config):
-    config.addinivalue_line(
-        "markers", "fault(name): what is tried; docs/reliability.md lists them"
-    )
+    config.addinivalue_line("markers", "fault(name): what is tried; tests/faults/count.py counts")
     if config.getoption("full"):
         settings.load_profile("full")
 

@@ -1,4 +1,4 @@
-"""What is tried against this project, and how often: the table of docs/reliability.md.
+"""What is tried against this project, and how often.
 
 python tests/faults/count.py             # hours
 python tests/faults/count.py --quick     # what the test suite does, minutes

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import psutil
 import pytest
@@ -48,29 +49,37 @@ def kill(after, script, *words, cwd=None):
     assert not psutil.wait_procs(family, timeout=60)[1]
 
 
+class Whole(NamedTuple):
+    """An evaluation that nothing stopped: its file, and how long it took (s)."""
+
+    content: bytes
+    duration: float
+
+
+@pytest.fixture
+def whole(only_full, tmp_path):
+    file, begun = tmp_path / "whole.jsonl", time.monotonic()
+    assert run(*EVALUATION, file)[0] == 0
+    return Whole(file.read_bytes(), time.monotonic() - begun)
+
+
 @pytest.mark.fault("killed evaluations")
-def test_an_evaluation_killed_at_any_time_is_finished(often, rng, tmp_path):
-    whole, parts = tmp_path / "whole.jsonl", tmp_path / "parts.jsonl"
-    begun = time.monotonic()
-    assert run(*EVALUATION, whole)[0] == 0
-    duration = time.monotonic() - begun
+def test_an_evaluation_killed_at_any_time_is_finished(often, rng, whole, tmp_path):
+    parts = tmp_path / "parts.jsonl"
     for _ in often(100):
         parts.unlink(missing_ok=True)
-        kill(rng.uniform(0.0, duration), *EVALUATION, parts)
+        kill(rng.uniform(0.0, whole.duration), *EVALUATION, parts)
         assert run(*EVALUATION, parts, *(["--resume"] if parts.exists() else []))[0] == 0
-        assert parts.read_bytes() == whole.read_bytes()
+        assert parts.read_bytes() == whole.content
 
 
 @pytest.mark.fault("killed workers")
-def test_an_evaluation_whose_worker_is_killed_is_finished(often, rng, tmp_path):
-    whole, parts = tmp_path / "whole.jsonl", tmp_path / "parts.jsonl"
-    begun = time.monotonic()
-    assert run(*EVALUATION, whole)[0] == 0
-    duration = time.monotonic() - begun
+def test_an_evaluation_whose_worker_is_killed_is_finished(often, rng, whole, tmp_path):
+    parts = tmp_path / "parts.jsonl"
     for _ in often(50):
         parts.unlink(missing_ok=True)
         with start(REPOSITORY / "eval.py", *EVALUATION[1:], parts) as process:
-            time.sleep(rng.uniform(0.0, duration))
+            time.sleep(rng.uniform(0.0, whole.duration))
             workers = psutil.Process(process.pid).children(recursive=True)
             for worker in workers[-1:]:
                 worker.kill()
@@ -79,7 +88,7 @@ def test_an_evaluation_whose_worker_is_killed_is_finished(often, rng, tmp_path):
         assert process.returncode == 0 or "died (exit code -9)" in said.splitlines()[-1]
         if process.returncode:
             assert run(*EVALUATION, parts, *(["--resume"] if parts.exists() else []))[0] == 0
-        assert parts.read_bytes() == whole.read_bytes()
+        assert parts.read_bytes() == whole.content
 
 
 @pytest.mark.fault("killed trainings")
