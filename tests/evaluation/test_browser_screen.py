@@ -6,7 +6,9 @@ import http.server
 import io
 import json
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -38,12 +40,18 @@ def listeners():
 
 
 def get(address, *files, headers=()):
-    """Status and content of a page, or of files that it asks for with its cookie."""
+    """Status and content of a page, or of files that it asks for with its cookie.
+
+    Browsers take its name for this machine; not every resolver does.
+    """
+    url = urllib.parse.urlsplit(address)
+    here = url._replace(netloc=f"127.0.0.1:{url.port}").geturl()
+    headers = {"Host": url.netloc} | dict(headers)
     cookies = urllib.request.HTTPCookieProcessor()
     opener = urllib.request.build_opener(cookies)
     answers = []
-    for url in (address, *(urllib.parse.urljoin(address, file) for file in files)):
-        request = urllib.request.Request(url, headers=dict(headers))
+    for place in (here, *(urllib.parse.urljoin(here, file) for file in files)):
+        request = urllib.request.Request(place, headers=headers)
         try:
             with opener.open(request, timeout=PATIENCE) as answer:
                 answers.append((answer.status, answer.read()))
@@ -80,7 +88,8 @@ def test_the_page_is_served_to_this_machine_alone(plain_model, browser_screen, c
     with contextlib.closing(browser_screen(plain_model)) as screen:
         opened = listeners() - before
         url = urllib.parse.urlsplit(screen.address)
-        assert (url.scheme, url.hostname, url.path) == ("http", "127.0.0.1", "/")
+        assert (url.scheme, url.path) == ("http", "/")
+        assert re.fullmatch(r"[0-9a-f]{16}\.localhost", url.hostname)
         assert ("127.0.0.1", url.port) in opened
         assert {ip for ip, _ in opened} == {"127.0.0.1"}
         files = ("web_client.js", "web_client.wasm", "model?total_bytes")
@@ -129,16 +138,18 @@ def test_the_page_is_shown_to_those_who_have_its_address(plain_model, browser_sc
             assert get(urllib.parse.quote(refused, "/:?="))[0] == 403
         for file in ("web_client.js", "model", "favicon.ico", "assets/ibl.ktx"):
             assert get(page + file)[0] == 403
-        cookies = {"Cookie": f"icub_jump_{url.port}={token}"}
+        cookies = {"Cookie": f"icub_jump={token}"}
         assert get(page, headers=cookies)[0] == 200
         assert get(page, headers={"Cookie": f'strange="; a=b; {cookies["Cookie"]}'})[0] == 200
-        for wrong in (f"icub_jump_{url.port}={token}x", f"icub_jump_{url.port}", f"a={token}"):
+        for wrong in (f"icub_jump={token}x", "icub_jump", f"a={token}"):
             assert get(page, headers={"Cookie": wrong})[0] == 403
         for headers, status in (
-            ({"Host": f"localhost:{url.port}"}, 200),
+            ({"Host": f"localhost:{url.port}"}, 403),
+            ({"Host": f"127.0.0.1:{url.port}"}, 403),
+            ({"Host": f"{16 * '0'}.localhost:{url.port}"}, 403),
             ({"Host": "rebound.example"}, 403),
             ({"Host": f"rebound.example:{url.port}"}, 403),
-            ({"Host": "127.0.0.1"}, 403),
+            ({"Host": url.hostname}, 403),
             ({"Origin": f"http://{url.netloc}"}, 200),
             ({"Origin": "http://evil.example"}, 403),
             ({"Origin": f"http://127.0.0.1:{url.port + 1}"}, 403),
@@ -156,13 +167,12 @@ def test_streams_are_for_the_page_alone_and_uploads_for_nobody(plain_model, brow
     refusal = pytest.importorskip("websockets.exceptions").InvalidStatus
     with contextlib.closing(browser_screen(plain_model)) as screen:
         url = urllib.parse.urlsplit(screen.address)
-        stream = f"ws://{url.netloc}"
-        cookie = {"Cookie": f"icub_jump_{url.port}={url.query.removeprefix('token=')}"}
+        cookie = {"Cookie": f"icub_jump={url.query.removeprefix('token=')}"}
 
         def connect(path, headers, origin=None):
             return client.connect(
-                stream + path, additional_headers=headers, origin=origin,
-                proxy=None, open_timeout=PATIENCE,
+                f"ws://{url.netloc}{path}", additional_headers=headers, origin=origin,
+                sock=socket.create_connection(("127.0.0.1", url.port)), open_timeout=PATIENCE,
             )  # fmt: skip
 
         screen.refresh({})
@@ -208,8 +218,11 @@ Promise.all(tries).then(() => { document.title = JSON.stringify(found); });
 def test_a_foreign_page_gets_nothing(plain_model, browser_screen, browser, tmp_path):
     from selenium.webdriver.support.wait import WebDriverWait
 
+    received = []
+
     class Foreign(http.server.SimpleHTTPRequestHandler):
         def do_GET(self):
+            received.append(self.headers.get("Cookie", ""))
             self.send_response(200)
             self.send_header("Content-Type", "text/html")
             self.end_headers()
@@ -226,7 +239,8 @@ def test_a_foreign_page_gets_nothing(plain_model, browser_screen, browser, tmp_p
         page = FOREIGN_PAGE % f"http://{url.netloc}/"
         threading.Thread(target=server.serve_forever).start()
         try:
-            browser.get(screen.address)  # from now on it has the cookie, which all ports share
+            browser.get(screen.address)  # from now on it has the cookie
+            assert browser.find_elements("tag name", "canvas")
             browser.get(f"http://127.0.0.1:{server.server_port}/")
             WebDriverWait(browser, PATIENCE).until(lambda _: browser.title.startswith("{"))
         finally:
@@ -246,16 +260,25 @@ def test_a_foreign_page_gets_nothing(plain_model, browser_screen, browser, tmp_p
         "frame": "other",
     }
     assert shown == ["chrome-error:", 0]
+    assert set(received) == {""}
 
 
 @serves
-def test_it_does_not_serve_without_its_gate(plain_model, browser_screen, monkeypatch):
+@pytest.mark.parametrize(
+    ("part", "says"),
+    [
+        ("web_server.serve", "to anybody on this machine"),
+        ("_kept_from_others", "to pages of other sites"),
+    ],
+)
+def test_it_does_not_serve_without_its_gate(plain_model, browser_screen, monkeypatch, part, says):
     """As if a future Studio served in another way."""
     from icub_jump_env.simulation.viewers import browser
 
     before = listeners()
-    monkeypatch.setattr(browser.web_server, "serve", browser._serve)
-    with pytest.raises(OSError, match="show the jump to anybody"):
+    ungated = {"web_server.serve": browser._serve, "_kept_from_others": lambda process: process}
+    monkeypatch.setattr(f"{browser.__name__}.{part}", ungated[part])
+    with pytest.raises(OSError, match=says):
         browser_screen(plain_model)
     assert listeners() == before
 

@@ -13,7 +13,8 @@ import scipy.sparse as sp
 from icub_jump_env.control.qp.problem import QPStatus, QuadraticProgram
 from icub_jump_env.control.qp.solvers import CheckedSolver
 
-KINDS = ("plain", "scaled", "flat", "degenerate", "contradictory", "outside", "poisoned")
+SOLVABLE = ("plain", "scaled", "flat", "degenerate")
+BROKEN = ("contradictory", "outside", "poisoned")
 
 
 def drawn(kind, rng):
@@ -48,8 +49,10 @@ def drawn(kind, rng):
     elif kind == "outside":  # an equality that no point within the bounds meets
         problem.lower[-1] = problem.upper[-1] = 1.1 * np.abs(problem.C[-1]).sum()
     elif kind == "poisoned":
-        field = getattr(problem, rng.choice(["H", "g", "C", "lower", "upper"]))
-        field.flat[rng.integers(field.size)] = rng.choice([np.nan, np.inf, -np.inf])
+        name = rng.choice(["H", "g", "C", "lower", "upper"])
+        poison = [np.nan] if name in ("lower", "upper") else [np.nan, np.inf, -np.inf]
+        field = getattr(problem, name)
+        field.flat[rng.integers(field.size)] = rng.choice(poison)
     return problem
 
 
@@ -88,11 +91,21 @@ def cost(problem, x):
     return 0.5 * x @ problem.H @ x + problem.g @ x
 
 
+def excess(problem, x):
+    """By how much a point leaves the bounds, of variables or rows."""
+    values = np.concatenate((x, problem.C @ x))
+    return max((problem.lower - values).max(), (values - problem.upper).max())
+
+
+LEAST_SOLVED = {"daqp": 1.0, "osqp": 0.9}
+"""Share of the cases; the rest is told as failed."""
+
+
 @pytest.mark.fault("broken programs")
-@pytest.mark.parametrize("name", ["daqp", "osqp"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", LEAST_SOLVED)
+@pytest.mark.parametrize("kind", (*SOLVABLE, *BROKEN))
 def test_what_is_called_solved_is_what_others_find(many, kind, name):
-    solved, cases = 0, many(20, 2_000)
+    solved, cases = 0, many(20, 500)
     for seed in range(cases):
         problem = drawn(kind, np.random.default_rng(seed))
         solution, report = CheckedSolver(name, problem).solve()
@@ -100,13 +113,12 @@ def test_what_is_called_solved_is_what_others_find(many, kind, name):
             continue
         solved += 1
         assert report.status is QPStatus.SOLVED
+        assert excess(problem, solution.x) <= 1e-5
         for other in (by_clarabel(problem), by_piqp(problem)):
             assert other is not None
             scale = 1.0 + abs(cost(problem, other))
             assert abs(cost(problem, solution.x) - cost(problem, other)) <= 1e-4 * scale
-            assert (problem.lower[: problem.n] - 1e-6 <= solution.x).all()
-            assert (solution.x <= problem.upper[: problem.n] + 1e-6).all()
-    if kind in ("contradictory", "outside"):
+    if kind in BROKEN:
         assert solved == 0
-    elif kind == "plain" or (name == "daqp" and kind != "poisoned"):
-        assert solved == cases
+    else:
+        assert solved >= LEAST_SOLVED[name] * cases

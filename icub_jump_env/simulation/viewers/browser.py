@@ -33,32 +33,32 @@ _PATIENCE = 10.0
 _Process = Callable[[Any, Request], Response | None]
 _Answer = Callable[[Any, Request, Response], Response | None]
 
+_COOKIE = "icub_jump"
+_LETS_IN_ALL = "Access-Control-Allow-Origin"
 _FOR_ITS_PAGE = {
-    "Access-Control-Allow-Origin": None,
     "Content-Security-Policy": "frame-ancestors 'none'",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-"""Headers of all answers; None: without it."""
+"""Headers of all answers."""
 
 
 class Gate:
     """Lets in who knows the address that was printed, and takes no files.
 
     The address holds a token; the page's own requests, which lack it, carry the cookie that
-    the page brought. Pages of other sites have neither. Requests by another name of this machine, or
-    from another site's page, are refused in any case. A browser sends the cookie to all ports of
-    this machine: whoever opens the page of another user's server there gives it away.
+    the page brought. Pages of other sites have neither. The page has a host name of its own, which
+    browsers take for this machine and another site: they send its cookie to no other server here.
+    Requests by another name, or from another site's page, are refused in any case.
 
     Attributes:
+        host: Name and port by which the page is asked for.
         address: The page, with the token.
     """
 
     def __init__(self, port: int) -> None:
         self._token = secrets.token_urlsafe(32)
-        # Cookies do not tell ports apart.
-        self._cookie = f"icub_jump_{port}"
-        self._hosts = [f"{name}:{port}" for name in (LOOPBACK, "localhost")]
-        self.address = f"http://{LOOPBACK}:{port}/?token={self._token}"
+        self.host = f"{secrets.token_hex(8)}.localhost:{port}"
+        self.address = f"http://{self.host}/?token={self._token}"
 
     def before(self, process: _Process) -> _Process:
         """``process``, for requests that are let in."""
@@ -71,7 +71,7 @@ class Gate:
             response = process(connection, request)
             if tokens and response is not None:
                 response.headers["Set-Cookie"] = (
-                    f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+                    f"{_COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
                 )
                 response.headers["Referrer-Policy"] = "no-referrer"
             return response
@@ -81,26 +81,24 @@ class Gate:
     def _admits(self, request: Request, tokens: list[str]) -> bool:
         headers = request.headers
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
-        if len(hosts) != 1 or hosts[0] not in self._hosts:
-            return False
-        if any(origin != f"http://{hosts[0]}" for origin in origins):
+        if hosts != [self.host] or any(origin != f"http://{self.host}" for origin in origins):
             return False
         cookies = [c.strip() for line in headers.get_all("Cookie") for c in line.split(";")]
-        known = [c.removeprefix(f"{self._cookie}=") for c in cookies if c.startswith(self._cookie)]
+        known = [c.removeprefix(f"{_COOKIE}=") for c in cookies if c.startswith(f"{_COOKIE}=")]
         given = tokens or known
         return any(secrets.compare_digest(t.encode(), self._token.encode()) for t in given)
 
 
 def _kept_from_others(process: _Answer) -> _Answer:
-    """``process``, whose answers no page of another port may show or load: cookies are the same there."""
+    """``process``, whose answers no other page may show or load."""
 
     def checked(connection: Any, request: Request, response: Response) -> Response:
         response = process(connection, request, response) or response
-        for name, value in _FOR_ITS_PAGE.items():
-            if name in response.headers:  # Studio lets in everybody, and assigning adds a line
+        for name in (_LETS_IN_ALL, *_FOR_ITS_PAGE):
+            if name in response.headers:  # assigning would add a line
                 del response.headers[name]
-            if value is not None:
-                response.headers[name] = value
+        for name, value in _FOR_ITS_PAGE.items():
+            response.headers[name] = value
         return response
 
     return checked
@@ -146,8 +144,7 @@ class LoopbackViewer(web_viewer.WebViewer):  # type: ignore[misc]
     dropped on the page.
 
     Attributes:
-        port: Where the page is.
-        address: The same with the token.
+        gate: Who is let in, and by which address.
     """
 
     @property
@@ -164,13 +161,12 @@ class LoopbackViewer(web_viewer.WebViewer):  # type: ignore[misc]
 
     @_http_sock.setter
     def _http_sock(self, bound: socket.socket) -> None:
-        host, self.port = bound.getsockname()[:2]
+        host, port = bound.getsockname()[:2]
         if host != LOOPBACK:
             bound.close()
             raise OSError(f"MuJoCo Studio would listen on {host} instead of {LOOPBACK}")
         gated = _GatedSocket(fileno=bound.detach())
-        gated.gate = Gate(self.port)
-        self.address = gated.gate.address
+        self.gate = gated.gate = Gate(port)
         gated.listen()  # a browser that comes before the server is up waits
         self._checked_socket = gated
 
@@ -276,9 +272,9 @@ class BrowserScreen(Screen):
             outcome = started.get()
         if isinstance(outcome, BaseException):
             raise outcome
-        self.address = outcome.address
+        self.address = outcome.gate.address
         try:
-            _check_gate(outcome.port)
+            _check(outcome.gate)
         except OSError:
             self.close()
             raise
@@ -299,13 +295,18 @@ class BrowserScreen(Screen):
         self._handle.close()
 
 
-def _check_gate(port: int) -> None:
-    """See that a request without the token is refused.
+def _check(gate: Gate) -> None:
+    """See that a request without the token is refused, and its answer kept from other pages.
 
     Raises:
         OSError: If it is not, or nobody answers.
     """
-    with contextlib.closing(http.client.HTTPConnection(LOOPBACK, port, _PATIENCE)) as connection:
-        connection.request("GET", "/")
-        if connection.getresponse().status != HTTPStatus.FORBIDDEN:
-            raise OSError("MuJoCo Studio would show the jump to anybody on this machine")
+    port = int(gate.host.partition(":")[2])
+    connection = http.client.HTTPConnection(LOOPBACK, port, _PATIENCE)
+    with contextlib.closing(connection):
+        connection.request("GET", "/", headers={"Host": gate.host})
+        answer = connection.getresponse()
+    if answer.status != HTTPStatus.FORBIDDEN:
+        raise OSError("MuJoCo Studio would show the jump to anybody on this machine")
+    if any(answer.headers.get_all(name) != [value] for name, value in _FOR_ITS_PAGE.items()):
+        raise OSError("MuJoCo Studio would show the jump to pages of other sites")
