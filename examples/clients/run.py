@@ -3,7 +3,7 @@
     python examples/clients/run.py               # all of them
     python examples/clients/run.py skrl_ppo
 
-What a client needs stands in its first lines, as in any script with inline metadata; versions are
+What a client needs beside this package stands in its first lines, as inline metadata; versions are
 those of constraints.txt where that has one and the client does not ask for another.
 """
 
@@ -71,10 +71,17 @@ def install(folder: Path, needs: Sequence[str]) -> Path:
     return python
 
 
-def run(client: str, python: Path, folder: Path) -> Outcome:
-    """Run a client in a folder of its own."""
-    file = CLIENTS[client]
-    names = sorted({NAME.match(need)[0] for need in (*dependencies_of(file), "gymnasium")})
+def run(client: str, pythons: dict[tuple[str, ...], Path], home: Path) -> Outcome:
+    """Run a client in a folder of its own, with a virtual environment that others may share."""
+    file, folder = CLIENTS[client], home / client
+    needs = dependencies_of(file)
+    if needs not in pythons:
+        try:
+            pythons[needs] = install(home / f"venv{len(pythons)}", needs)
+        except subprocess.CalledProcessError as error:
+            return Outcome(client, "", f"not installed: pip ended with {error.returncode}", True)
+    python = pythons[needs]
+    names = sorted({NAME.match(need)[0] for need in (*needs, "gymnasium")})
     found = subprocess.run(
         [python, "-c", VERSIONS, *names], check=True, stdout=subprocess.PIPE, text=True
     )
@@ -99,10 +106,7 @@ def main() -> None:
     with TemporaryDirectory() as home:
         pythons: dict[tuple[str, ...], Path] = {}
         for client in chosen:
-            needs = dependencies_of(CLIENTS[client])
-            if needs not in pythons:
-                pythons[needs] = install(Path(home) / f"venv{len(pythons)}", needs)
-            outcomes.append(run(client, pythons[needs], Path(home) / client))
+            outcomes.append(run(client, pythons, Path(home)))
             print(f"{client}: {outcomes[-1].said}", file=sys.stderr)
     print("| client | with | it says | on |\n|---|---|---|---|")
     for outcome in outcomes:

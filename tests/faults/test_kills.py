@@ -36,7 +36,7 @@ def start(*words, cwd=None):
 def run(script, *words, cwd=None):
     """Exit code and what it complains of."""
     with start(REPOSITORY / script, *words, cwd=cwd) as process:
-        _, said = process.communicate()
+        _, said = process.communicate(timeout=600)
     return process.returncode, said
 
 

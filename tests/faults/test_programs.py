@@ -103,7 +103,7 @@ LEAST_SOLVED = {"daqp": 1.0, "osqp": 0.9}
 
 @pytest.mark.fault("broken programs")
 @pytest.mark.parametrize("name", LEAST_SOLVED)
-@pytest.mark.parametrize("kind", (*SOLVABLE, *BROKEN))
+@pytest.mark.parametrize("kind", [*SOLVABLE, *BROKEN])
 def test_what_is_called_solved_is_what_others_find(many, kind, name):
     solved, cases = 0, many(20, 500)
     for seed in range(cases):

@@ -8,7 +8,6 @@ import pytest
 
 from icub_jump_env.versions import VERSIONS
 
-
 ABSURD = (math.nan, math.inf, -math.inf, 1e300, -1e300, 1e11, 1e6)
 STATE = ("qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart")
 MODEL = ("body_mass", "body_inertia", "dof_damping", "dof_armature", "geom_friction", "jnt_range")
