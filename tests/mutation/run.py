@@ -1,0 +1,187 @@
+"""How many random changes of the code the tests notice.
+
+    pip install cosmic-ray
+    python tests/mutation/run.py --jobs 2        # hours; an interrupted run goes on
+
+Cosmic Ray makes all mutants of the packages that decide what is measured and commanded: another
+operator, comparison or number, a condition turned round, a line less. A random sample of them is tried.
+The tests of a mutant's own package come first, the others if those notice nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import queue
+import random
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from cosmic_ray.commands.init import _all_work_items
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+from cosmic_ray.testing import run_tests
+from cosmic_ray.work_item import TestOutcome
+from rich.console import Console
+
+from icub_jump_env.evaluation.report.output import new_table, show
+from icub_jump_env.evaluation.statistics.summary import Rate
+
+REPOSITORY = Path(__file__).parents[2]
+PACKAGES = ("control", "estimation", "metrics", "planning")
+OTHERS = ("tests/simulation", *(f"tests/test_{name}.py" for name in (
+    "nominal", "env", "env_controllers", "env_episode_end", "env_determinism", "env_series", "residual_phases", "versions",
+)))  # fmt: skip
+"""Tests of what the packages do together."""
+LONGEST = 900.0
+"""Longest time (s) of the tests; a mutant that takes longer is noticed."""
+ARITHMETIC = {"Add", "Sub", "Mul", "Div"}
+"""Operators that replace one another; of numbers the others fail at once, or stand in annotations."""
+EXPLAINED = Path(__file__).with_name("explained.toml")
+
+
+class Mutant(NamedTuple):
+    """One change of the code.
+
+    Attributes:
+        package: Of which of :data:`PACKAGES`.
+        module: Its file.
+        operator: What is changed, in Cosmic Ray's words.
+        occurrence: At which place.
+        before, after: The lines that differ.
+    """
+
+    package: str
+    module: str
+    operator: str
+    occurrence: int
+    before: str
+    after: str
+
+
+def all_of(package: str) -> Iterator[tuple[str, str, int]]:
+    """Module, operator and occurrence of all mutants."""
+    modules = sorted((REPOSITORY / "icub_jump_env" / package).rglob("*.py"))
+    for item in _all_work_items(modules, {}):
+        (mutation,) = item.mutations
+        kind, *operators = mutation.operator_name.split("/")[1].split("_")
+        if kind != "ReplaceBinaryOperator" or ARITHMETIC.issuperset(operators):
+            module = str(Path(mutation.module_path).relative_to(REPOSITORY))
+            yield module, mutation.operator_name, mutation.occurrence
+
+
+def mutated(module: str, operator: str, occurrence: int) -> str:
+    """The code of a mutant."""
+    code = (REPOSITORY / module).read_text()
+    found: str | None = mutate_code(code, get_operator(operator)(), occurrence)
+    assert found is not None
+    return found
+
+
+def drawn(package: str, count: int) -> list[Mutant]:
+    """A random sample, the same each time."""
+    everything = list(all_of(package))
+    sample = random.Random(package).sample(everything, min(count, len(everything)))
+    mutants = []
+    for module, operator, occurrence in sample:
+        lines = (REPOSITORY / module).read_text().splitlines()
+        others = mutated(module, operator, occurrence).splitlines()
+        first = next(i for i, pair in enumerate(zip(lines, others, strict=False)) if len(set(pair)) > 1)
+        before, after = lines[first].strip(), others[first].strip()
+        mutants.append(Mutant(package, module, operator, occurrence, before, after))
+    return mutants
+
+
+def is_noticed(mutant: Mutant, copy: Path) -> bool:
+    """Whether a test fails in a copy of the repository with a mutant."""
+    file = copy / mutant.module
+    code = file.read_text()
+    file.write_text(mutated(mutant.module, mutant.operator, mutant.occurrence))
+    try:
+        for tests in ((f"tests/{mutant.package}",), OTHERS):
+            words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"--rootdir={copy}"]
+            words += ["-c", str(copy / "pyproject.toml"), *(str(copy / test) for test in tests)]
+            environment = {"PYTHONPATH": copy, "NUMBA_CACHE_DIR": copy / "compiled"}
+            command = ["env", *(f"{name}={value}" for name, value in environment.items()), *words]
+            if run_tests(" ".join(command), LONGEST)[0] is not TestOutcome.SURVIVED:
+                return True
+        return False
+    finally:
+        file.write_text(code)
+
+
+def copies(folder: Path, count: int) -> queue.SimpleQueue[Path]:
+    """Copies of what is committed, each to be changed by one at a time."""
+    found: queue.SimpleQueue[Path] = queue.SimpleQueue()
+    for number in range(count):
+        copy = folder / str(number)
+        subprocess.run(["git", "clone", "-q", REPOSITORY, copy], check=True)
+        found.put(copy)
+    return found
+
+
+def explained() -> dict[tuple[str, str, str], str]:
+    """Why a mutant that no test notices is none: by module, line and changed line."""
+    entries = tomllib.loads(EXPLAINED.read_text())["mutant"] if EXPLAINED.exists() else []
+    return {(e["module"], e["before"], e["after"]): e["why"] for e in entries}
+
+
+def try_all(mutants: Iterable[Mutant], results: Path, jobs: int) -> dict[Mutant, bool]:
+    """Whether each mutant is noticed; those in ``results`` are not tried again."""
+    noticed: dict[Mutant, bool] = {}
+    if results.exists():
+        for line in results.read_text().splitlines():
+            *mutant, was_noticed = json.loads(line)
+            noticed[Mutant(*mutant)] = was_noticed
+    with TemporaryDirectory() as folder, results.open("a") as file, ThreadPoolExecutor(jobs) as pool:
+        free = copies(Path(folder), jobs)
+
+        def attempt(mutant: Mutant) -> tuple[Mutant, bool]:
+            copy = free.get()
+            try:
+                return mutant, is_noticed(mutant, copy)
+            finally:
+                free.put(copy)
+
+        todo = [mutant for mutant in mutants if mutant not in noticed]
+        for mutant, was_noticed in pool.map(attempt, todo):
+            noticed[mutant] = was_noticed
+            print(json.dumps([*mutant, was_noticed]), file=file, flush=True)
+    return noticed
+
+
+def main() -> None:
+    """Try a sample of each package, and print what was noticed."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--mutants", type=int, default=100, help="of each package")
+    parser.add_argument("--jobs", type=int, default=1, help="copies of the repository side by side")
+    parser.add_argument("--results", type=Path, default=Path("mutants.jsonl"), help="kept here")
+    options = parser.parse_args()
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    samples = {package: drawn(package, options.mutants) for package in PACKAGES}
+    everything = [mutant for sample in samples.values() for mutant in sample]
+    noticed, why = try_all(everything, options.results, options.jobs), explained()
+    table = new_table(1, "package", "mutants", "tried", "noticed", "explained", "noticed or explained, %")
+    for package, sample in samples.items():
+        seen = sum(noticed[mutant] for mutant in sample)
+        known = sum((m.module, m.before, m.after) in why for m in sample if not noticed[m])
+        rate = Rate(seen + known, len(sample))
+        low, high = rate.interval
+        percent = f"{100 * rate.share:.0f} ({100 * low:.0f} to {100 * high:.0f})"
+        count = f"{sum(1 for _ in all_of(package)):,}"
+        table.add_row(package, count, str(len(sample)), str(seen), str(known), percent)
+    show(Console(), table)
+    for mutant in everything:
+        if not noticed[mutant] and (mutant.module, mutant.before, mutant.after) not in why:
+            print(f"{mutant.module}\n  {mutant.before}\n  {mutant.after}")
+
+
+if __name__ == "__main__":
+    main()
