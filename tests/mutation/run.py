@@ -18,7 +18,7 @@ import random
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,8 +27,6 @@ from typing import NamedTuple
 from cosmic_ray.commands.init import _all_work_items
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
-from cosmic_ray.testing import run_tests
-from cosmic_ray.work_item import TestOutcome
 from rich.console import Console
 
 from icub_jump_env.evaluation.report.output import new_table, show
@@ -93,10 +91,25 @@ def drawn(package: str, count: int) -> list[Mutant]:
     for module, operator, occurrence in sample:
         lines = (REPOSITORY / module).read_text().splitlines()
         others = mutated(module, operator, occurrence).splitlines()
-        first = next(i for i, pair in enumerate(zip(lines, others, strict=False)) if len(set(pair)) > 1)
+        first = next(
+            i for i, pair in enumerate(zip(lines, others, strict=False)) if len(set(pair)) > 1
+        )
         before, after = lines[first].strip(), others[first].strip()
         mutants.append(Mutant(package, module, operator, occurrence, before, after))
     return mutants
+
+
+def passes(tests: Sequence[str], copy: Path) -> bool:
+    """Whether all of these tests pass in a copy of the repository."""
+    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+    paths = {"PYTHONPATH": str(copy), "NUMBA_CACHE_DIR": str(copy / "compiled")}
+    try:
+        ran = subprocess.run(
+            words, cwd=copy, env=os.environ | paths, timeout=LONGEST, capture_output=True
+        )
+    except subprocess.TimeoutExpired:
+        return False
+    return ran.returncode == 0
 
 
 def is_noticed(mutant: Mutant, copy: Path) -> bool:
@@ -105,14 +118,7 @@ def is_noticed(mutant: Mutant, copy: Path) -> bool:
     code = file.read_text()
     file.write_text(mutated(mutant.module, mutant.operator, mutant.occurrence))
     try:
-        for tests in ((f"tests/{mutant.package}",), OTHERS):
-            words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"--rootdir={copy}"]
-            words += ["-c", str(copy / "pyproject.toml"), *(str(copy / test) for test in tests)]
-            environment = {"PYTHONPATH": copy, "NUMBA_CACHE_DIR": copy / "compiled"}
-            command = ["env", *(f"{name}={value}" for name, value in environment.items()), *words]
-            if run_tests(" ".join(command), LONGEST)[0] is not TestOutcome.SURVIVED:
-                return True
-        return False
+        return not all(passes(tests, copy) for tests in ((f"tests/{mutant.package}",), OTHERS))
     finally:
         file.write_text(code)
 
@@ -140,7 +146,11 @@ def try_all(mutants: Iterable[Mutant], results: Path, jobs: int) -> dict[Mutant,
         for line in results.read_text().splitlines():
             *mutant, was_noticed = json.loads(line)
             noticed[Mutant(*mutant)] = was_noticed
-    with TemporaryDirectory() as folder, results.open("a") as file, ThreadPoolExecutor(jobs) as pool:
+    with (
+        TemporaryDirectory() as folder,
+        results.open("a") as file,
+        ThreadPoolExecutor(jobs) as pool,
+    ):
         free = copies(Path(folder), jobs)
 
         def attempt(mutant: Mutant) -> tuple[Mutant, bool]:
@@ -161,14 +171,18 @@ def main() -> None:
     """Try a sample of each package, and print what was noticed."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--mutants", type=int, default=100, help="of each package")
-    parser.add_argument("--jobs", type=int, default=1, help="copies of the repository side by side")
+    parser.add_argument(
+        "--jobs", type=int, default=1, help="copies of the repository side by side"
+    )
     parser.add_argument("--results", type=Path, default=Path("mutants.jsonl"), help="kept here")
     options = parser.parse_args()
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     samples = {package: drawn(package, options.mutants) for package in PACKAGES}
     everything = [mutant for sample in samples.values() for mutant in sample]
     noticed, why = try_all(everything, options.results, options.jobs), explained()
-    table = new_table(1, "package", "mutants", "tried", "noticed", "explained", "noticed or explained, %")
+    table = new_table(
+        1, "package", "mutants", "tried", "noticed", "explained", "noticed or explained, %"
+    )
     for package, sample in samples.items():
         seen = sum(noticed[mutant] for mutant in sample)
         known = sum((m.module, m.before, m.after) in why for m in sample if not noticed[m])
