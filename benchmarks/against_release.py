@@ -1,67 +1,62 @@
-"""Fail if a step has become slower, beside its physics, than in the last release.
+"""Fail if episodes take longer than with the last release, which plays them in turn with this checkout.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/against_release.py
 
-What counts is the ratio of a step to its ``mj_step`` calls, as in ``bench_env.py``, never a time.
-A case fails if its median ratio exceeds the release's by more than 15 % and the noise measured
-here: the distance from the median to the lower end of its 95 % interval. ``--write`` notes the
-ratios of now, for a release.
+A case fails if the median of the ratios is more than 15 % above 1, by its 95 % interval.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import io
+import itertools
+import subprocess
 import sys
-from functools import partial
+import tarfile
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
 
 import numpy as np
-from bench_env import HARD, ours, physics_of, play
+from compare_speed import compare
 from scipy.stats import quantile_test
 
-RELEASE = Path(__file__).with_name("release.json")
+REPOSITORY = Path(__file__).parents[1]
+RELEASE = "dd8b82a89374da084d058edb6281e855bf035300"
 LOSS = 0.15
-
-CASES: dict[str, dict[str, Any]] = {
-    "velocity": {},
-    "torque": {"controller": "torque"},
-    "velocity, v1, hard": {"name": "ICubJump-v1", **HARD},
-    "torque, v1, hard": {"name": "ICubJump-v1", "controller": "torque", **HARD},
-}
+ROUNDS = 20
+CASES = ("episode", "episode, v1, hard")
 
 
-def ratios(config: dict[str, Any], episodes: int) -> np.ndarray:
-    """Of an episode to its physics, (episodes,)."""
-    make = partial(ours, **config)
-    env, observed = make(through_python=False), make(through_python=True)
-    play(env, 0), play(observed, 0)  # whatever happens once
-    return np.array([play(env, s).wall / physics_of(observed, s) for s in range(episodes)])
+def unpack_release(folder: Path) -> bool:
+    """Put the release's files into a folder; whether this clone has them."""
+    command = ["git", "archive", "--format=tar", RELEASE]
+    archive = subprocess.run(command, cwd=REPOSITORY, capture_output=True)
+    if archive.returncode:
+        return False
+    with tarfile.open(fileobj=io.BytesIO(archive.stdout)) as content:
+        content.extractall(folder, filter="data")
+    return True
 
 
 def main() -> int:
     """Compare; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--episodes", type=int, default=25)
-    parser.add_argument("--write", action="store_true", help="note the ratios of now")
-    arguments = parser.parse_args()
-    found = {what: ratios(config, arguments.episodes) for what, config in CASES.items()}
-    medians = {what: float(np.median(values)) for what, values in found.items()}
-    if arguments.write:
-        told = {what: round(ratio, 3) for what, ratio in medians.items()}
-        RELEASE.write_text(json.dumps(told, indent=2) + "\n")
-        return 0
-    release, slower = json.loads(RELEASE.read_text()), False
-    for what, values in found.items():
-        now, then = medians[what], release[what]
-        noise = now - quantile_test(values, q=now, p=0.5).confidence_interval().low
-        lost = now > (1.0 + LOSS) * then + noise
-        slower = slower or lost
-        print(
-            f"{what:20s} step / its mj_steps {now:.2f} +- {noise:.2f}, "
-            f"{now / then - 1.0:+.0%} of {then:.2f}{': slower' if lost else ''}"
-        )
+    argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args()
+    slower = False
+    with TemporaryDirectory() as name:
+        release = Path(name)
+        if not unpack_release(release):
+            print(f"not compared: this clone is without the release, {RELEASE[:7]}")
+            return 0
+        for controller, what in itertools.product(("velocity", "torque"), CASES):
+            found = compare([release, REPOSITORY], what, controller, ROUNDS)
+            ratios = np.array([new["wall"] / old["wall"] for old, new in found])
+            interval = quantile_test(ratios, q=1.0, p=0.5).confidence_interval()
+            lost = interval.low > 1.0 + LOSS
+            slower = slower or lost
+            print(
+                f"{controller}, {what}: {np.median(ratios):.3f} times as long "
+                f"({interval.low:.3f} to {interval.high:.3f}){': slower' if lost else ''}"
+            )
     return int(slower)
 
 
