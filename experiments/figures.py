@@ -126,7 +126,7 @@ def learning_curves(folder: Path, task: str = "") -> Figure:
         ]
         for controller in CONTROLLERS
     }
-    figure, ((left, right),) = panels((9.0, 3.5), columns=2)
+    figure, ((left, right),) = panels((9.0, 3.8), columns=2)
     for axis, name, scale, label in (
         (left, "success", PERCENT, "success (%)"),
         (right, "rise", CM, "mean CoM rise (cm)"),
@@ -138,11 +138,13 @@ def learning_curves(folder: Path, task: str = "") -> Figure:
             common = min(map(len, curves))
             steps = np.array([point["timesteps"] for point in curves[0][:common]]) / 1000
             values = scale * np.array([[point[name] for point in c[:common]] for c in curves])
-            axis.plot(steps, values.T, color=color, lw=0.6, alpha=0.5)
+            lines = axis.plot(steps, values.T, color=color, lw=0.6, alpha=0.5)
+            lines[0].set_label(f"{controller}, each of {len(curves)} seeds")
             mean = interquartile_mean(values, axis=0)
-            axis.plot(steps, mean, color=color, lw=2.0, label=f"{controller}, {len(curves)} seeds")
+            axis.plot(steps, mean, color=color, lw=2.0, label=f"{controller}, interquartile mean")
         axis.set(xlabel="steps (thousand)", ylabel=label)
-    left.legend(frameon=False)
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
 
 

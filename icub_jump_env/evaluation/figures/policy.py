@@ -41,18 +41,18 @@ def policy_figure(config: JumpConfig, policy: Episode, baseline: Episode) -> Fig
         range(3), ("forward", "left", "up"), (MEASURED, ACCENT, DESIRED), strict=True
     ):
         offset.plot(time, moved[:, axis], color=color, label=name)
-    offset.legend(frameon=False)
     for episode, name, color in ((baseline, "baseline", ACCENT), (policy, "policy", MEASURED)):
         shown = [s for s in episode.trace if s.time <= takeoff + _AFTER]
         times = [s.time for s in shown]
         height.plot(times, [s.com[2] for s in shown], color=color, label=name)
         pitch.plot(times, [DEG * s.base_pitch for s in shown], color=color)
-    height.legend(frameon=False)
     for axis, title, unit in (
         (offset, "offset of the CoM reference", "cm"),
         (height, "CoM height", "m"),
         (pitch, "base pitch (positive: forward)", "deg"),
     ):
         describe(axis, title, unit)
-        mark_takeoff(axis, takeoff)
+        mark_takeoff(axis, takeoff, "commanded take-off")
+    offset.legend(frameon=False)
+    height.legend(frameon=False)
     return figure

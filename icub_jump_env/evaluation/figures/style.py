@@ -17,8 +17,9 @@ MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"
 """Of curves: what happened, what was wanted, and what stands beside them."""
 
 CONTROLLER: dict[ControllerName, str] = {"velocity": MEASURED, "torque": DESIRED}
-CONTENDERS = ("0.55", "tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
-"""Of those that are compared, in their order; the first one is the baseline."""
+CONTENDERS = ("0.55", "#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7")
+"""Of those that are compared, in their order; the first one is the baseline. The others are of Okabe and
+Ito's palette, which readers who see fewer colours tell apart."""
 
 PAGE = {
     "ink": (INK, INK, "#d5dde5"),
@@ -59,9 +60,9 @@ def describe(axis: Axes, title: str, unit: str, abscissa: str = "time (s)") -> N
     axis.set(xlabel=abscissa, ylabel=unit)
 
 
-def mark_takeoff(axis: Axes, time: float) -> None:
-    """Draw a line at a time (s)."""
-    axis.axvline(time, color=ACCENT, lw=0.8, ls=":")
+def mark_takeoff(axis: Axes, time: float, label: str | None = None) -> None:
+    """Draw a line at a time (s), under a name for the legend."""
+    axis.axvline(time, color=ACCENT, lw=0.8, ls=":", label=label)
 
 
 def on_a_page() -> AbstractContextManager[None]:
