@@ -228,11 +228,16 @@ def measure(config: JumpConfig, episodes: int, jobs: int, progress: Console) -> 
     begun = dict(zip(both, starts(config, both), strict=True))
 
     def play(lines: Sequence[Line], on: Sequence[int]) -> dict[Line, Success]:
-        work = [Job(config, seed, line.policy(begun[seed])) for line in lines for seed in on]
+        same = {line: line if line.offset or line.gain else ZERO for line in lines}
+        tried = list(dict.fromkeys(same.values()))
+        work = [Job(config, seed, line.policy(begun[seed])) for line in tried for seed in on]
         played = np.array([each.is_success for each in run_all(work, jobs, progress)], bool)
-        return dict(zip(lines, played.reshape(len(lines), len(on)), strict=True))
+        found = dict(zip(tried, played.reshape(len(tried), len(on)), strict=True))
+        return {line: found[as_played] for line, as_played in same.items()}
 
     def best(lines: Sequence[Line]) -> Line:
+        if play([ZERO], first)[ZERO].all():
+            return ZERO
         success = play(lines, first)
         return max(lines, key=lambda line: (success[line].mean(), -abs(line.offset)))
 
@@ -272,8 +277,8 @@ def render(
         }
         table.add_row(
             regime, controller, percent["zero"],
-            percent["constant"], f"{constant.axis} {constant.offset:+g}",
-            percent["law"], f"{law.axis} {law.offset:+g} {law.gain:+g} lean",
+            percent["constant"], "zero" if constant == ZERO else f"{constant.axis} {constant.offset:+g}",
+            percent["law"], "zero" if law == ZERO else f"{law.axis} {law.offset:+g} {law.gain:+g} lean",
             percent["hindsight"], percent["after the push"],
         )  # fmt: skip
     return table

@@ -7,6 +7,7 @@ from rich.console import Console
 from experiments.headroom import (
     GRID,
     REGIMES,
+    ZERO,
     Line,
     Shift,
     Start,
@@ -72,16 +73,41 @@ def test_pushes_begin_within_the_launch():
     assert all(0.0 <= start.push <= 0.5 for start in begun)
 
 
-def test_a_small_measurement_is_told(monkeypatch):
+@pytest.fixture
+def small(monkeypatch):
+    """A measurement of few actions, in a world."""
     monkeypatch.setattr("experiments.headroom.GRID", {"forward": (0.0, 0.1), "pitch": (0.0, 0.1)})
     monkeypatch.setattr("experiments.headroom.LAWS", (("pitch", (0.0,), (-2.0,)),))
-    config = JumpConfig.of(residual_axes=AXES, residual_phases="all", early_end=True)
-    found = measure(config, 2, 1, Console(quiet=True))
-    for name in ("zero", "constant", "law", "hindsight", "after the push"):
-        assert found[name].tolist() == [True, True]
+
+    def measured(world, episodes):
+        config = JumpConfig.of(randomization=world, residual_axes=AXES, early_end=True)
+        return measure(config, episodes, 1, Console(quiet=True))
+
+    return measured
+
+
+def told(found):
     console = Console(record=True, width=150)
     console.print(render(Options(episodes=2), {("full", "velocity"): found}))
-    assert "pitch +0 -2 lean" in console.export_text()
+    return console.export_text()
+
+
+def test_where_nothing_fails_nothing_is_chosen(small):
+    found = small("none", 2)
+    for name in ("zero", "constant", "law", "hindsight", "after the push"):
+        assert found[name].tolist() == [True, True]
+    assert found["chosen constant"] == found["chosen law"] == ZERO
+    assert told(found).split().count("zero") == 3
+
+
+def test_elsewhere_hindsight_loses_nothing(small):
+    found = small("disturbed", 4)
+    zero = found["zero"]
+    assert not zero.all()
+    for name in ("hindsight", "after the push"):
+        assert (found[name] >= zero).all()
+    assert found["chosen law"] == Line("pitch", 0.0, -2.0)
+    assert "pitch +0 -2 lean" in told(found)
 
 
 @pytest.mark.parametrize("change", [{"jobs": 0}, {"regimes": ("calm",)}, {"env": "ICubJump-v7"}])
