@@ -171,7 +171,7 @@ def cells_of(jumps: Array, gains: Array | None, confidence: float = CONFIDENCE) 
             continue
         gained = gains[:, quantity]
         values = (interquartile_mean(gained.mean(axis=1)), *runs_interval(gained, confidence))
-        gain, low, high = (f"{value:+.{decimals}f}" for value in values)
+        gain, low, high = (f"{value:+z.{decimals}f}" for value in values)
         cells.append(f"{gain} ({low} to {high})")
     return cells
 

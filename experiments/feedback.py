@@ -117,7 +117,7 @@ def render(policy: LoadedPolicy, launches: Launches) -> Table:
     table = new_table(1, "moves", *(f"{n}." for n in range(1, SHOWN + 1)))
     for axis, row in zip(network.axes, weight * spread, strict=True):
         largest = np.argsort(-np.abs(row))[:SHOWN]
-        table.add_row(axis, *(f"{network.inputs[i]} {row[i]:+.2f}" for i in largest))
+        table.add_row(axis, *(f"{network.inputs[i]} {row[i]:+z.2f}" for i in largest))
     table.caption = f"{len(launches.slope)} launches; action per standard deviation of the input"
     return table
 

@@ -126,10 +126,10 @@ def render(controller: ControllerName, results: Sequence[LandingResult]) -> Tabl
             number(theirs.landed.share, "%"),
             number(ours.landed.share, "%"),
             ours.landed.bounds,
-            f"{100 * difference.gain:+.1f}",
-            "{:+.1f} to {:+.1f}".format(*(100 * bound for bound in difference.interval)),
+            f"{100 * difference.gain:+z.1f}",
+            "{:+z.1f} to {:+z.1f}".format(*(100 * bound for bound in difference.interval)),
             probability(difference.p_value if p is None else p),
-            f"{100 * force:+.0f}",
+            f"{100 * force:+z.0f}",
             number(ours.mean_rise, "cm"),
             number(ours.median("limit_violations"), "steps"),
         )

@@ -353,8 +353,8 @@ def cells(ours: Sequence[Episode], theirs: Sequence[Episode]) -> list[str]:
     rises = (f"{CM * np.mean([e.jump['flight_height'] for e in es]):.2f}" for es in (ours, theirs))
     rise, least, most = (CM * value for value in (added.rise, *added.rise_interval))
     return [
-        *shares, f"{points:+.1f} ({low:+.1f} to {high:+.1f})",
-        *rises, f"{rise:+.2f} ({least:+.2f} to {most:+.2f})",
+        *shares, f"{points:+z.1f} ({low:+z.1f} to {high:+z.1f})",
+        *rises, f"{rise:+z.2f} ({least:+z.2f} to {most:+z.2f})",
     ]  # fmt: skip
 
 

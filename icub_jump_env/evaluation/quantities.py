@@ -40,7 +40,7 @@ def shown(value: float | None, unit: str, signed: bool = False) -> str:
     """The same of a value that is in this unit already, with decimals that suit it."""
     if value is None or math.isnan(value):
         return "-"
-    return f"{value:{'+' if signed else ''}.{_DECIMALS[unit]}f}"
+    return f"{value:{'+' if signed else ''}z.{_DECIMALS[unit]}f}"
 
 
 def spread(low: float, high: float, unit: str, signed: bool = False) -> str:

@@ -52,7 +52,7 @@ def policy_figure(config: JumpConfig, policy: Episode, baseline: Episode) -> Fig
         (pitch, "base pitch (positive: forward)", "deg"),
     ):
         describe(axis, title, unit)
-        mark_takeoff(axis, takeoff, "commanded take-off")
+        mark_takeoff(axis, takeoff, "commanded take-off" if axis is height else None)
     offset.legend(frameon=False)
     height.legend(frameon=False)
     return figure

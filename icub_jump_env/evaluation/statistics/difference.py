@@ -138,7 +138,7 @@ class Difference:
         )
 
     def __str__(self) -> str:
-        points = f"{PERCENT * self.success:+.1f}"
+        points = f"{PERCENT * self.success:+z.1f}"
         rise, soles = (
             f"{number(value, 'cm', signed=True)} cm" for value in (self.rise, self.sole_height)
         )
@@ -149,7 +149,7 @@ class Difference:
         if self.corrected_p_value is not None:
             p += f", corrected {_shown(self.corrected_p_value)}"
         return (
-            f"success {points} points (95 % interval {low:+.1f} to {high:+.1f}; "
+            f"success {points} points (95 % interval {low:+z.1f} to {high:+z.1f}; "
             f"won {self.won}, lost {self.lost}, McNemar {p}), "
             f"rise {rise} ({spread(*self.rise_interval, 'cm', signed=True)}), "
             f"soles {soles} ({spread(*self.sole_height_interval, 'cm', signed=True)})"
