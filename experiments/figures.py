@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from experiments.shipped import CURVE_SUFFIX
@@ -19,6 +20,7 @@ from icub_jump_env.evaluation.figures.style import (
     CONTENDERS,
     CONTROLLER,
     DESIRED,
+    INK,
     MEASURED,
     Figure,
     describe,
@@ -35,41 +37,43 @@ if TYPE_CHECKING:
 
 
 def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
-    """Mean rise over the success rate; labels name command and displacement (cm).
+    """Mean rise over the success rate; labels name the displacement (cm) of baselines.
 
     Args:
         points: The grid.
         chosen: Those of it that meet the policy.
     """
-    figure, ((axis,),) = panels((6.5, 4.2))
-    names = dict.fromkeys(point.contender.name for point in points)
+    figure, ((axis,),) = panels((7.5, 4.2))
     baseline, constant, _, policy, *_ = CONTENDERS
-    for name, color in zip(names, (baseline, constant, policy), strict=True):
-        shown = [p for p in points if p.contender.name == name]
-        shares = [PERCENT * p.summary.success.share for p in shown]
-        rises = [CM * p.summary.mean_rise for p in shown]
-        axis.plot(shares, rises, "o", color=color, label=name)
-        for point, share, rise in zip(shown, shares, rises, strict=True):
+    names = dict.fromkeys(point.contender.name for point in points)
+    colors = dict(zip(names, (baseline, constant, policy), strict=True))
+    heights = sorted({point.jump_height for point in points})
+    markers = dict(zip(heights, ("o", "s", "^", "D"), strict=False))
+    for point in points:
+        place = PERCENT * point.summary.success.share, CM * point.summary.mean_rise
+        color = colors[point.contender.name]
+        axis.plot(*place, markers[point.jump_height], color=color, ms=6)
+        if color == baseline:
             axis.annotate(
-                f"{CM * point.jump_height:g}/{CM * point.displacement:g}",
-                (share, rise),
-                textcoords="offset points",
-                xytext=(6, 4),
-                fontsize=7,
-                color=color,
-            )
-    axis.plot(
-        [PERCENT * point.summary.success.share for point in chosen],
-        [CM * point.summary.mean_rise for point in chosen],
-        "o",
-        ms=11,
-        mfc="none",
-        mec="k",
-        label="meet the policy",
+                f"{CM * point.displacement:g}", place, textcoords="offset points", xytext=(5, 3),
+                fontsize=8, color=color,
+            )  # fmt: skip
+        if point in chosen:
+            axis.plot(*place, "o", ms=13, mfc="none", mec="k")
+    shown: list[tuple[str, dict[str, Any]]] = [
+        *((name, {"marker": "o", "color": color}) for name, color in colors.items()),
+        *(
+            (f"{CM * h:g} cm", {"marker": m, "color": INK, "mfc": "none"})
+            for h, m in markers.items()
+        ),
+        ("meets the policy", {"marker": "o", "color": "k", "mfc": "none", "ms": 13}),
+    ]
+    handles = [Line2D([], [], ls="", label=label, **look) for label, look in shown]
+    axis.legend(
+        handles=handles, frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5)
     )
     axis.set(xlabel="success (%)", ylabel="mean CoM rise (cm)")
-    axis.set_title("command / displacement (cm)", fontsize=9)
-    axis.legend(frameon=False)
+    axis.set_title("marks: command; numbers: displacement of baselines (cm)", fontsize=9)
     return figure
 
 

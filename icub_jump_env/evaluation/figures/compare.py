@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.figures.style import CONTENDERS, Figure, panels
+from icub_jump_env.evaluation.figures.style import CONTENDERS, INK, Figure, panels
 from icub_jump_env.evaluation.quantities import CM, PERCENT
 from icub_jump_env.evaluation.statistics.summary import Summary, by_command, command_labels
 from icub_jump_env.metrics.jump import SuccessConfig
@@ -26,7 +27,6 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
     figure, ((left, right),) = panels((9.0, 3.8), columns=2)
     shift = 0.8 / len(episodes)
     bars: list[Artist] = []
-    fallen: dict[str, Artist] = {}
     for number, (name, series) in enumerate(episodes.items()):
         color = CONTENDERS[number % len(CONTENDERS)]
         groups = by_command(series)
@@ -43,9 +43,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
         left.set_xticks(range(len(groups)), names)
         for landed, marker in ((True, "."), (False, "x")):
             shown = [e for e in series if e.landed == landed]
-            if not shown:
-                continue
-            (points,) = right.plot(
+            right.plot(
                 [CM * e.jump_height for e in shown],
                 [CM * e.jump["flight_height"] for e in shown],
                 marker,
@@ -53,11 +51,11 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
                 alpha=0.7,
                 color=color,
             )
-            if not landed:
-                fallen[f"{name}, fallen"] = points
     commands = [CM * e.jump_height for series in episodes.values() for e in series]
     ends = np.array([min(commands), max(commands)])
-    lines = {
+    meanings = {
+        "landed": Line2D([], [], ls="", marker=".", color=INK),
+        "fallen": Line2D([], [], ls="", marker="x", ms=4, color=INK),
         "command": right.plot(ends, ends, color="k", lw=0.8)[0],
         "least for a success": right.plot(ends, success.height_ratio * ends, "k:", lw=0.8)[0],
     }
@@ -65,7 +63,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
     right.set(xlabel="command (cm)", ylabel="CoM rise (cm)")
     above = {"ncols": 3, "loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
     _name(left, dict(zip(episodes, bars, strict=True)), **above)
-    _name(right, fallen | lines)
+    _name(right, meanings)
     return figure
 
 
