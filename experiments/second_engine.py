@@ -298,9 +298,12 @@ class DrakePhysics(Physics):
 
 
 class DrakeEnv(ICubJumpEnv):
-    """The environment, in Drake."""
+    """The environment, in Drake, whose steps are not compiled."""
 
     _engine = DrakePhysics
+
+    def __init__(self, **config: Any) -> None:
+        super().__init__(**config | {"physics_loop": "python"})
 
 
 @dataclass(frozen=True)

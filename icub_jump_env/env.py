@@ -132,7 +132,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             cfg.sensor_config,
             cfg.randomization_config,
             cfg.command_delay,
-            compiled=cfg.physics_loop == "compiled" and self._engine is Physics,
+            compiled=cfg.physics_loop == "compiled",
         )
         kinematics = FeetFixedKinematics(self.robot)
         self._estimator: Estimator = FeetFixedEstimator(kinematics)
