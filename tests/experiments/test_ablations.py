@@ -127,7 +127,8 @@ def test_curves_show_every_seed_and_their_mean_as_far_as_all_go(runs):
     values = np.array([line.get_ydata() for line in seeds])
     assert values[2].tolist() == pytest.approx([52, 62])
     np.testing.assert_allclose(mean.get_ydata(), values.mean(axis=0))  # they are symmetric
-    assert mean.get_label() == "velocity, 5 seeds"
+    told = [text.get_text() for text in success.figure.legends[0].get_texts()]
+    assert told == ["velocity, each of 5 seeds", "velocity, interquartile mean"]
     assert rise.lines[4].get_ydata().tolist() == pytest.approx([4.4, 4.4])
 
 
