@@ -54,9 +54,11 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
         color = colors[point.contender.name]
         axis.plot(*place, markers[point.jump_height], color=color, ms=6)
         if color == baseline:
+            # Neighbours of other commands below.
+            height = -10 if heights.index(point.jump_height) % 2 else 4
             axis.annotate(
-                f"{CM * point.displacement:g}", place, textcoords="offset points", xytext=(5, 3),
-                fontsize=8, color=color,
+                f"{CM * point.displacement:g}", place, textcoords="offset points",
+                xytext=(4, height), fontsize=8, color=color,
             )  # fmt: skip
         if point in chosen:
             axis.plot(*place, "o", ms=13, mfc="none", mec="k")
