@@ -118,7 +118,7 @@ def is_noticed(mutant: Mutant, copy: Path) -> bool:
     code = file.read_text()
     file.write_text(mutated(mutant.module, mutant.operator, mutant.occurrence))
     try:
-        return not all(passes(tests, copy) for tests in ((f"tests/{mutant.package}",), OTHERS))
+        return not (passes([f"tests/{mutant.package}"], copy) and passes(OTHERS, copy))
     finally:
         file.write_text(code)
 
@@ -152,6 +152,10 @@ def try_all(mutants: Iterable[Mutant], results: Path, jobs: int) -> dict[Mutant,
         ThreadPoolExecutor(jobs) as pool,
     ):
         free = copies(Path(folder), jobs)
+        copy = free.get()
+        if not passes([*(f"tests/{package}" for package in PACKAGES), *OTHERS], copy):
+            sys.exit("error: tests fail without any mutant")
+        free.put(copy)
 
         def attempt(mutant: Mutant) -> tuple[Mutant, bool]:
             copy = free.get()
