@@ -11,8 +11,8 @@ from rich.console import Console
 
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.cli import guarded, parse, seek
-from icub_jump_env.evaluation.episodes.workers import WorkerError
 from icub_jump_env.evaluation.report.output import say
+from icub_jump_env.workers import WorkerError
 
 from .options import OPTIONS, TrainOptions, read_options
 

@@ -29,9 +29,9 @@ from icub_jump_env.evaluation.episodes.cluster import (
     give_up,
     remote,
 )
-from icub_jump_env.evaluation.episodes.workers import WorkerError
 from icub_jump_env.evaluation.report.output import progress_display, say
 from icub_jump_env.files import write_files
+from icub_jump_env.workers import WorkerError
 
 from .options import OPTIONS, TrainOptions
 from .training import PACKAGES, claimed, train

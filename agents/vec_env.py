@@ -15,9 +15,9 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs
 
 from icub_jump_env.errors import ConfigError, InvalidValueError
 from icub_jump_env.evaluation.episodes.rollout import Episode
-from icub_jump_env.evaluation.episodes.workers import end_workers, start_workers
 from icub_jump_env.policy import Policy
 from icub_jump_env.vector import ICubJumpVectorEnv
+from icub_jump_env.workers import end_workers, start_workers
 
 from .environment import Env, EnvServer
 

@@ -6,7 +6,7 @@ from unittest.mock import patch
 
 import pytest
 
-from icub_jump_env.evaluation.episodes.workers import THREADS
+from icub_jump_env.workers import THREADS
 
 
 @contextlib.contextmanager

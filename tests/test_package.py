@@ -31,7 +31,7 @@ LAYERS = (
     ("robot",),
     ("mappings", "linear_algebra", "records"),
     ("compiled",),
-    ("checks", "files", "carded", "versions"),
+    ("checks", "files", "carded", "versions", "workers"),
     ("errors",),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -23,8 +23,8 @@ from agents.vec_env import JumpVecEnv, ThreadVecEnv
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, InvalidValueError
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
-from icub_jump_env.evaluation.episodes.workers import WorkerError
 from icub_jump_env.policy import BASELINE
+from icub_jump_env.workers import WorkerError
 
 ACTION = np.zeros((2, 1), np.float32)
 CONFIG = JumpConfig.of(stand_time=0.0)

@@ -1,10 +1,11 @@
 """The live view in a browser: for who knows its address alone, and the same episode."""
 
 import contextlib
-import gc
 import http.server
+import importlib
 import io
 import json
+import multiprocessing
 import os
 import re
 import signal
@@ -12,7 +13,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import types
 import urllib.error
 import urllib.parse
@@ -29,13 +29,20 @@ from icub_jump_env.evaluation.episodes.rollout import make_env, traced
 from icub_jump_env.evaluation.modes import view
 from icub_jump_env.evaluation.modes.view import Playback, Show
 from icub_jump_env.simulation.viewers.screen import Command, CommandQueue
+from icub_jump_env.workers import WorkerError
 
 PATIENCE = 120.0
+BROWSER = "icub_jump_env.simulation.viewers.browser"
 
 
-def listeners():
-    """Addresses that this process listens on."""
-    connections = psutil.Process().net_connections(kind="inet")
+def careless_pages():
+    """Only where Studio can be imported."""
+    return importlib.import_module("careless_pages")
+
+
+def listeners(screen):
+    """Addresses that the process with the page listens on."""
+    connections = psutil.Process(screen.server.process.pid).net_connections(kind="inet")
     return {(c.laddr.ip, c.laddr.port) for c in connections if c.status == psutil.CONN_LISTEN}
 
 
@@ -61,32 +68,14 @@ def get(address, *files, headers=()):
     return answers if files else answers[0]
 
 
-serves = pytest.mark.filterwarnings("ignore::ResourceWarning")
-"""Studio leaves its connections to the garbage collector."""
-
-
 @pytest.fixture
 def browser_screen():
-    """Studio crashes where a viewer meets native threads of an earlier one: wait for their end."""
-    kind = pytest.importorskip("icub_jump_env.simulation.viewers.browser").BrowserScreen
-    threads = psutil.Process().num_threads()
-
-    class LoneScreen(kind):
-        def close(self):
-            super().close()
-            gc.collect()
-            deadline = time.monotonic() + PATIENCE
-            while psutil.Process().num_threads() > threads and time.monotonic() < deadline:
-                time.sleep(0.01)
-
-    return LoneScreen
+    return pytest.importorskip("icub_jump_env.simulation.viewers.browser").BrowserScreen
 
 
-@serves
 def test_the_page_is_served_to_this_machine_alone(plain_model, browser_screen, capsys):
-    before = listeners()
     with contextlib.closing(browser_screen(plain_model)) as screen:
-        opened = listeners() - before
+        opened = listeners(screen)
         url = urllib.parse.urlsplit(screen.address)
         assert (url.scheme, url.path) == ("http", "/")
         assert re.fullmatch(r"[0-9a-f]{16}\.localhost", url.hostname)
@@ -101,32 +90,56 @@ def test_the_page_is_served_to_this_machine_alone(plain_model, browser_screen, c
             assert len(content) > 100_000
         assert json.loads(size[1])["total_bytes"] > 10_000
         assert screen.refresh({"time": "0.000 s"}) == []
-    assert listeners() == before
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", url.port))
     assert capsys.readouterr().out == ""
 
 
-@serves
-def test_it_can_be_opened_again(plain_model, browser_screen):
-    """Studio crashes where a viewer meets the remains of another."""
-    for _ in range(2):
-        with contextlib.closing(browser_screen(plain_model)) as screen:
+def test_several_can_be_open_at_a_time(plain_model, browser_screen):
+    with (
+        contextlib.closing(browser_screen(plain_model)) as one,
+        contextlib.closing(browser_screen(plain_model)) as another,
+    ):
+        assert one.address != another.address
+        for screen in (one, another):
             assert get(screen.address)[0] == 200
             assert screen.refresh({}) == []
 
 
-@serves
-def test_it_does_not_start_where_others_could_connect(plain_model, browser_screen, monkeypatch):
-    """As if a future Studio chose its address in another way."""
-    from icub_jump_env.simulation.viewers.browser import LoopbackViewer
+def test_a_port_that_another_program_has_just_taken_is_left_to_it(
+    plain_model, browser_screen, monkeypatch
+):
+    monkeypatch.setattr(f"{BROWSER}.Page", careless_pages().with_its_port_taken)
+    with contextlib.closing(browser_screen(plain_model)) as screen:
+        assert get(screen.address)[0] == 200
 
-    before = listeners()
-    monkeypatch.setattr(LoopbackViewer, "_host", None)
-    with pytest.raises(OSError, match=r"would listen on (::|0\.0\.0\.0) "):
+
+@pytest.mark.parametrize(
+    ("page", "says"),
+    [
+        ("listening_everywhere", r"would listen on (::|0\.0\.0\.0) "),
+        ("shown_to_anybody", "to anybody on this machine"),
+        ("shown_to_other_sites", "to pages of other sites"),
+    ],
+)
+def test_it_does_not_start_where_others_could_connect(
+    plain_model, browser_screen, monkeypatch, page, says
+):
+    monkeypatch.setattr(f"{BROWSER}.Page", getattr(careless_pages(), page))
+    with pytest.raises(WorkerError, match=says):
         browser_screen(plain_model)
-    assert listeners() == before
+    assert multiprocessing.active_children() == []
 
 
-@serves
+def test_a_crash_of_studio_is_an_error_here(plain_model, browser_screen, monkeypatch):
+    monkeypatch.setattr(f"{BROWSER}.Page", careless_pages().AbortingPage)
+    with (
+        contextlib.closing(browser_screen(plain_model)) as screen,
+        pytest.raises(WorkerError, match=r"the live view died \(exit code -6\)"),
+    ):
+        screen.refresh({})
+
+
 @pytest.mark.fault("foreign pages")
 def test_the_page_is_shown_to_those_who_have_its_address(plain_model, browser_screen):
     with contextlib.closing(browser_screen(plain_model)) as screen:
@@ -160,7 +173,6 @@ def test_the_page_is_shown_to_those_who_have_its_address(plain_model, browser_sc
         assert token not in another.address
 
 
-@serves
 @pytest.mark.fault("foreign pages")
 def test_streams_are_for_the_page_alone_and_uploads_for_nobody(plain_model, browser_screen):
     client = pytest.importorskip("websockets.sync.client")
@@ -213,7 +225,6 @@ Promise.all(tries).then(() => { document.title = JSON.stringify(found); });
 </script>"""
 
 
-@serves
 @pytest.mark.fault("foreign pages")
 def test_a_foreign_page_gets_nothing(plain_model, browser_screen, browser, tmp_path):
     from selenium.webdriver.support.wait import WebDriverWait
@@ -263,27 +274,6 @@ def test_a_foreign_page_gets_nothing(plain_model, browser_screen, browser, tmp_p
     assert set(received) == {""}
 
 
-@serves
-@pytest.mark.parametrize(
-    ("part", "says"),
-    [
-        ("web_server.serve", "to anybody on this machine"),
-        ("_kept_from_others", "to pages of other sites"),
-    ],
-)
-def test_it_does_not_serve_without_its_gate(plain_model, browser_screen, monkeypatch, part, says):
-    """As if a future Studio served in another way."""
-    from icub_jump_env.simulation.viewers import browser
-
-    before = listeners()
-    ungated = {"web_server.serve": browser._serve, "_kept_from_others": lambda process: process}
-    monkeypatch.setattr(f"{browser.__name__}.{part}", ungated[part])
-    with pytest.raises(OSError, match=says):
-        browser_screen(plain_model)
-    assert listeners() == before
-
-
-@serves
 def test_the_episode_in_the_browser_is_that_of_run_episode(browser_screen):
     clock, env = Clock(), make_env(traced(SHORT))
     with contextlib.closing(browser_screen(env.model)) as screen:
@@ -300,17 +290,17 @@ def test_the_episode_in_the_browser_is_that_of_run_episode(browser_screen):
 
 
 def test_every_button_and_key_of_the_page_has_its_command(monkeypatch):
-    view_browser = pytest.importorskip("icub_jump_env.simulation.viewers.browser")
-    real, pressed, written = view_browser.imgui, set(), []
+    page = pytest.importorskip("icub_jump_env.simulation.viewers.page")
+    real, pressed, written = page.imgui, set(), []
     fake = types.SimpleNamespace(
         Key=real.Key, Cond=real.Cond, WindowFlags=real.WindowFlags, Vec2=real.Vec2,
         SetNextWindowPos=lambda *_: None, Begin=lambda *_, **__: None, End=lambda: None,
         SameLine=lambda: None, NewLine=lambda: None, TextUnformatted=written.append,
         IsKeyPressed=lambda key, repeat: key in pressed, Button=lambda label: label in pressed,
     )  # fmt: skip
-    monkeypatch.setattr(view_browser, "imgui", fake)
+    monkeypatch.setattr(page, "imgui", fake)
     commands = CommandQueue()
-    panel = view_browser.Panel(commands)
+    panel = page.Panel(commands)
     panel.caption = {"time": "0.100 s", "phase": "launch"}
     keys = real.Key
     for one, command in {
@@ -333,7 +323,9 @@ def test_every_button_and_key_of_the_page_has_its_command(monkeypatch):
 
 
 def test_a_missing_studio_names_the_remedy(plain_model, monkeypatch):
-    monkeypatch.delitem(sys.modules, "icub_jump_env.simulation.viewers.browser", raising=False)
+    for module in ("browser", "page"):
+        name = f"icub_jump_env.simulation.viewers.{module}"
+        monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "mujoco.studio", None)
     with pytest.raises(MissingDependencyError, match=r"MuJoCo Studio .* pip install mujoco"):
         view.open_screen(plain_model, True, Console(file=io.StringIO()))

@@ -17,7 +17,7 @@ from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.episodes import cluster as cluster_module
 from icub_jump_env.evaluation.episodes.cluster import Cluster, OtherCodeError
 from icub_jump_env.evaluation.episodes.parallel import Job, run_jobs
-from icub_jump_env.evaluation.episodes.workers import THREADS, WorkerError
+from icub_jump_env.workers import THREADS, WorkerError
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -15,7 +15,7 @@ import pytest
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes import parallel
 from icub_jump_env.evaluation.episodes.parallel import Job, run_all, run_jobs
-from icub_jump_env.evaluation.episodes.workers import WorkerError
+from icub_jump_env.workers import WorkerError
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any
 
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, ICubJumpError, MissingDependencyError
-from icub_jump_env.evaluation.episodes.workers import THREADS, Server, WorkerError
 from icub_jump_env.evaluation.report.provenance import content, versions
+from icub_jump_env.workers import THREADS, Server, WorkerError
 
 if TYPE_CHECKING:
     import ray

@@ -13,14 +13,14 @@ from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.evaluation.episodes.cluster import Cluster, Jobs, Slot, check_plans
 from icub_jump_env.evaluation.episodes.rollout import Episode, make_env, run_episode
-from icub_jump_env.evaluation.episodes.workers import (
+from icub_jump_env.evaluation.report.output import progress_display
+from icub_jump_env.policy import BASELINE, Policy
+from icub_jump_env.workers import (
     WorkerError,
     end_workers,
     start_workers,
     wait_for_any,
 )
-from icub_jump_env.evaluation.report.output import progress_display
-from icub_jump_env.policy import BASELINE, Policy
 
 
 class Job(NamedTuple):

@@ -54,21 +54,22 @@ class Stage:
     Attributes:
         model: A copy of the model.
         data: Data of the copy.
+        state: The remembered state of the simulation, as ``mj_getState`` gives it.
     """
 
     def __init__(self, model: Any) -> None:
         self.model = copy.deepcopy(model)
         self.data = mujoco.MjData(self.model)
-        self._state = np.zeros(mujoco.mj_stateSize(self.model, _STATE))
+        self.state = np.zeros(mujoco.mj_stateSize(self.model, _STATE))
         self.take(self.data)
 
     def take(self, data: Any) -> None:
         """Remember the present state of a simulation."""
-        mujoco.mj_getState(self.model, data, self._state, _STATE)
+        mujoco.mj_getState(self.model, data, self.state, _STATE)
 
     def set(self) -> None:
         """Put the remembered state into the data."""
-        mujoco.mj_setState(self.model, self.data, self._state, _STATE)
+        mujoco.mj_setState(self.model, self.data, self.state, _STATE)
         mujoco.mj_forward(self.model, self.data)
 
     def aim(self, camera: Any) -> None:

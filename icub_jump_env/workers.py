@@ -1,7 +1,8 @@
 """Worker processes: each answers requests, one after the other, over a connection of its own.
 
 All local parallel work goes through here: episodes side by side in an evaluation
-(:mod:`~icub_jump_env.evaluation.episodes.parallel`), environments side by side in a training.
+(:mod:`~icub_jump_env.evaluation.episodes.parallel`), environments side by side in a training, and
+what may crash without us (:mod:`~icub_jump_env.simulation.viewers.browser`).
 A connection of its own tells which worker died. ``concurrent.futures`` does not tell, and its
 processes outlive a killed parent.
 """
@@ -56,7 +57,7 @@ class Worker:
     """
 
     def __init__(self, name: str, make_server: Callable[[], Server]) -> None:
-        """Start the process; use :func:`start_workers`, which prepares its surroundings.
+        """Start the process, with one thread unless the user said else.
 
         Args:
             name: What errors call it.
@@ -68,7 +69,7 @@ class Worker:
         self.process = context.Process(
             target=_serve, args=(theirs, make_server), name=name, daemon=True
         )
-        with theirs:
+        with theirs, _inherited():
             self.process.start()
 
     def send(self, request: Any) -> None:
@@ -103,12 +104,11 @@ class Worker:
 
 
 def start_workers(make_servers: Iterable[Callable[[], Server]]) -> list[Worker]:
-    """Start a worker for each of the servers, with one thread unless the user said else."""
+    """Start a worker for each of the servers."""
     workers: list[Worker] = []
     try:
-        with _inherited_by_workers():
-            for index, make_server in enumerate(make_servers):
-                workers.append(Worker(f"worker {index}", make_server))
+        for index, make_server in enumerate(make_servers):
+            workers.append(Worker(f"worker {index}", make_server))
     except BaseException:
         end_workers(workers)
         raise
@@ -153,7 +153,7 @@ def _requests(connection: Connection) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def _inherited_by_workers() -> Iterator[None]:
+def _inherited() -> Iterator[None]:
     """For processes started meanwhile: no Ctrl-C, and one thread.
 
     Ctrl-C is held back here, not lost.
