@@ -69,8 +69,12 @@ class Worker:
         self.process = context.Process(
             target=_serve, args=(theirs, make_server), name=name, daemon=True
         )
-        with theirs, _inherited():
-            self.process.start()
+        try:
+            with theirs, _inherited():
+                self.process.start()
+        except BaseException:  # a Ctrl-C that was held back
+            self.end()
+            raise
 
     def send(self, request: Any) -> None:
         """Hand over a request.
@@ -97,6 +101,13 @@ class Worker:
         if failure is not None:
             raise WorkerError(f"{self.name} failed: {failure}")
         return answer
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        if self.process.pid is not None:
+            self.process.kill()
+            self.process.join()
+        self._connection.close()
 
     def _death(self) -> WorkerError:
         self.process.join(_LAST_BREATH)
@@ -125,9 +136,7 @@ def wait_for_any(workers: Iterable[Worker]) -> list[Worker]:
 def end_workers(workers: Iterable[Worker]) -> None:
     """End the workers, whatever they do."""
     for worker in workers:
-        worker.process.kill()
-    for worker in workers:
-        worker.process.join()
+        worker.end()
 
 
 def _serve(connection: Connection, make_server: Callable[[], Server]) -> None:
@@ -136,14 +145,15 @@ def _serve(connection: Connection, make_server: Callable[[], Server]) -> None:
     Each answer is a pair: None and the answer, or what went wrong, in one line, and None;
     the worker ends after such a failure.
     """
-    try:
-        with contextlib.closing(make_server()) as server:
+    with contextlib.ExitStack() as stack:
+        try:
+            server = stack.enter_context(contextlib.closing(make_server()))
             for request in _requests(connection):
                 connection.send((None, server(request)))
-    except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        with contextlib.suppress(OSError):  # nobody listens any more
-            connection.send((reason, None))
+        except Exception as error:  # told before the server is closed, which may take long
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            with contextlib.suppress(OSError):  # nobody listens any more
+                connection.send((reason, None))
 
 
 def _requests(connection: Connection) -> Iterator[Any]:

@@ -1,49 +1,64 @@
 """Pages as if a future Studio served in another way; importable in workers."""
 
+import functools
 import os
 import socket
+import threading
 
 from icub_jump_env.simulation.viewers import page
 from icub_jump_env.simulation.viewers.page import LoopbackViewer, Page
 
 
-def listening_everywhere(model):
+def listening_everywhere():
     LoopbackViewer._host = None
-    return Page(model)
+    return Page()
 
 
-def shown_to_anybody(model):
+def shown_to_anybody():
     page.web_server.serve = page._serve
-    return Page(model)
+    return Page()
 
 
-def shown_to_other_sites(model):
-    page.kept_from_others = lambda process: process
-    return Page(model)
+def shown_to_other_sites():
+    page.kept_from_others = lambda handler: handler
+    return Page()
 
 
 class AbortingPage(Page):
-    def __call__(self, scene):
-        if scene is not None:
-            os.abort()
-        return super().__call__(scene)
+    def show(self, state, caption):
+        os.abort()
 
 
-def with_its_port_taken(model):
-    """Another program listens between Studio's choice and our use of it."""
+class FailingPage(Page):
+    def show(self, state, caption):
+        raise ValueError("no paint left")
+
+
+class HangingPage(FailingPage):
+    """Whose viewer would never end."""
+
+    def open(self, model):
+        address = super().open(model)
+        self._handle.close = threading.Event().wait
+        return address
+
+
+def with_its_port_taken(address="127.0.0.1"):
+    """Another program listens there between Studio's choice and our use of it."""
     bind = page.web_server.bind_public_socket
 
     def bind_too_late(*arguments):
         bound = bind(*arguments)
-        rival = socket.socket()
+        rival = socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET)
         rival.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        rival.bind(bound.getsockname())
+        rival.bind((address, bound.getsockname()[1]))
         rival.listen()
         rivals.append(rival)
         return bound
 
     page.web_server.bind_public_socket = bind_too_late
-    return Page(model)
+    return Page()
 
 
+with_its_name_taken = functools.partial(with_its_port_taken, "::1")
 rivals = []

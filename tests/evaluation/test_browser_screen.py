@@ -73,7 +73,7 @@ def browser_screen():
     return pytest.importorskip("icub_jump_env.simulation.viewers.browser").BrowserScreen
 
 
-def test_the_page_is_served_to_this_machine_alone(plain_model, browser_screen, capsys):
+def test_the_page_is_served_to_this_machine_alone(plain_model, browser_screen, capfd):
     with contextlib.closing(browser_screen(plain_model)) as screen:
         opened = listeners(screen)
         url = urllib.parse.urlsplit(screen.address)
@@ -90,9 +90,8 @@ def test_the_page_is_served_to_this_machine_alone(plain_model, browser_screen, c
             assert len(content) > 100_000
         assert json.loads(size[1])["total_bytes"] > 10_000
         assert screen.refresh({"time": "0.000 s"}) == []
-    with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", url.port))
-    assert capsys.readouterr().out == ""
+    assert not screen.server.process.is_alive()
+    assert capfd.readouterr().out == ""
 
 
 def test_several_can_be_open_at_a_time(plain_model, browser_screen):
@@ -106,12 +105,20 @@ def test_several_can_be_open_at_a_time(plain_model, browser_screen):
             assert screen.refresh({}) == []
 
 
-def test_a_port_that_another_program_has_just_taken_is_left_to_it(
-    plain_model, browser_screen, monkeypatch
+@pytest.mark.fault("foreign pages")
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere an address is taken once")
+@pytest.mark.parametrize("taken", ["with_its_port_taken", "with_its_name_taken"])
+def test_a_port_that_another_program_has_is_left_to_it(
+    plain_model, browser_screen, monkeypatch, taken
 ):
-    monkeypatch.setattr(f"{BROWSER}.Page", careless_pages().with_its_port_taken)
+    """Also of IPv6, where browsers would ask first."""
+    monkeypatch.setattr(f"{BROWSER}.Page", getattr(careless_pages(), taken))
     with contextlib.closing(browser_screen(plain_model)) as screen:
+        url = urllib.parse.urlsplit(screen.address)
+        assert not 8080 <= url.port < 8090
         assert get(screen.address)[0] == 200
+        with socket.socket(socket.AF_INET6) as late, pytest.raises(OSError, match="in use"):
+            late.bind(("::1", url.port))
 
 
 @pytest.mark.parametrize(
@@ -131,13 +138,69 @@ def test_it_does_not_start_where_others_could_connect(
     assert multiprocessing.active_children() == []
 
 
-def test_a_crash_of_studio_is_an_error_here(plain_model, browser_screen, monkeypatch):
-    monkeypatch.setattr(f"{BROWSER}.Page", careless_pages().AbortingPage)
+@pytest.mark.parametrize(
+    ("page", "says"),
+    [
+        ("AbortingPage", r"the live view died \(exit code -6\)"),
+        ("FailingPage", "the live view failed: ValueError: no paint left"),
+        ("HangingPage", "the live view failed: ValueError: no paint left"),
+    ],
+)
+def test_a_crash_of_studio_is_an_error_here(plain_model, browser_screen, monkeypatch, page, says):
+    monkeypatch.setattr(f"{BROWSER}.Page", getattr(careless_pages(), page))
     with (
         contextlib.closing(browser_screen(plain_model)) as screen,
-        pytest.raises(WorkerError, match=r"the live view died \(exit code -6\)"),
+        pytest.raises(WorkerError, match=says),
     ):
         screen.refresh({})
+
+
+PROGRAM = """
+from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.modes import view
+from rich.console import Console
+import careless_pages
+from icub_jump_env.simulation.viewers import browser
+
+browser.Page = careless_pages.HangingPage
+view.in_browser = lambda: True
+"""
+SHOW = "view.view(JumpConfig(), 0, Console())"
+GUARDED = f"if __name__ == '__main__':\n    {SHOW}\n"
+
+
+@contextlib.contextmanager
+def program(text, folder):
+    """A running program that shows a jump."""
+    pytest.importorskip(BROWSER)
+    file = folder / "program.py"
+    file.write_text(PROGRAM + text)
+    environment = os.environ | {"PYTHONUNBUFFERED": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(
+        [sys.executable, file],
+        env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@pytest.mark.fault("killed workers")
+def test_the_page_ends_with_its_program(tmp_path):
+    with program(GUARDED, tmp_path) as process:
+        assert process.stdout.readline().startswith("open ")
+        children = psutil.Process(process.pid).children()
+        process.kill()
+        assert psutil.wait_procs(children, PATIENCE)[1] == []
+
+
+def test_an_unguarded_program_is_told_why_it_shows_nothing(tmp_path):
+    with program(SHOW, tmp_path) as process:
+        _, complaint = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "if __name__ == '__main__'" in complaint
+    assert "WorkerError: the live view died (exit code 1)" in complaint
 
 
 @pytest.mark.fault("foreign pages")

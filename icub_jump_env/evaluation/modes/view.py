@@ -199,6 +199,7 @@ def open_screen(model: Any, browser: bool, console: Console) -> Screen:
 
     Raises:
         MissingDependencyError: If that is impossible.
+        WorkerError: If the page's server does not come up.
     """
     if not browser:
         screen: Screen = WindowScreen(model)
@@ -219,7 +220,7 @@ def open_screen(model: Any, browser: bool, console: Console) -> Screen:
 
 @contextlib.contextmanager
 def ctrl_c() -> Iterator[threading.Event]:
-    """Set an event at Ctrl-C instead of interrupting: viewers left alone crash at the end.
+    """Set an event at Ctrl-C instead of interrupting: windows left alone crash at the end.
 
     A second Ctrl-C interrupts.
     """
@@ -254,6 +255,7 @@ def view(config: JumpConfig, seed: int, console: Console, policy: Policy = BASEL
 
     Raises:
         MissingDependencyError: If the jump cannot be shown.
+        WorkerError: If the page's server does not come up, or dies.
     """
     browser = in_browser()
     # Any mode loads the meshes; this one opens nothing before it is asked for a picture. A step

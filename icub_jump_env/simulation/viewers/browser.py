@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 from icub_jump_env.simulation.viewers.page import Page
 from icub_jump_env.simulation.viewers.screen import Caption, Command, Screen
-from icub_jump_env.workers import Worker, end_workers
+from icub_jump_env.workers import Worker
 
 
 class BrowserScreen(Screen):
@@ -28,9 +27,9 @@ class BrowserScreen(Screen):
             WorkerError: If the server does not come up, or would let anybody in.
         """
         super().__init__(model)
-        self.server = Worker("the live view", partial(Page, self._stage.model))
+        self.server = Worker("the live view", Page)
         try:
-            self.server.send(None)
+            self.server.send(self._stage.model)
             self.address: str = self.server.recv()
         except BaseException:
             self.close()
@@ -48,4 +47,4 @@ class BrowserScreen(Screen):
 
     def close(self) -> None:
         """End the server."""
-        end_workers([self.server])
+        self.server.end()

@@ -15,7 +15,7 @@ from websockets.http11 import Request, Response
 
 LOOPBACK = "127.0.0.1"
 
-Process = Callable[[Any, Request], Response | None]
+Handler = Callable[[Any, Request], Response | None]
 """Answers a request, or lets it pass."""
 
 Answer = Callable[[Any, Request, Response], Response | None]
@@ -51,7 +51,7 @@ class Gate:
         self.host = f"{secrets.token_hex(8)}.localhost:{port}"
         self.address = f"http://{self.host}/?token={self._token}"
 
-    def before(self, process: Process) -> Process:
+    def before(self, process: Handler) -> Handler:
         """``process``, for requests that are let in."""
 
         def checked(connection: Any, request: Request) -> Response | None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import logging
+import os
 import queue
 import socket
 from typing import Any
@@ -19,7 +21,7 @@ from icub_jump_env.simulation.viewers.gate import (
     LOOPBACK,
     Answer,
     Gate,
-    Process,
+    Handler,
     check,
     kept_from_others,
 )
@@ -27,9 +29,6 @@ from icub_jump_env.simulation.viewers.screen import Caption, Command, CommandQue
 
 _TITLE = "iCub jump"
 _MARGIN = 12.0
-
-Scene = tuple[Array, Caption]
-"""What to show: state of the simulation and texts."""
 
 
 class _GatedSocket(socket.socket):
@@ -44,7 +43,7 @@ _serve = web_server.serve
 def _serve_gated(
     *arguments: Any,
     sock: socket.socket,
-    process_request: Process,
+    process_request: Handler,
     process_response: Answer,
     **options: Any,
 ) -> Any:
@@ -63,7 +62,8 @@ class LoopbackViewer(web_viewer.WebViewer):  # type: ignore[misc]
     """Studio's web viewer, for this machine alone.
 
     Studio listens on every interface, asks for no password and loads models that are
-    dropped on the page.
+    dropped on the page. Its second socket, between the panel and the server, is open to other
+    programs on this machine: who finds its port sees the page's keys, and could draw a panel.
 
     Attributes:
         gate: Who is let in, and by which address.
@@ -89,12 +89,36 @@ class LoopbackViewer(web_viewer.WebViewer):  # type: ignore[misc]
             raise OSError(f"MuJoCo Studio would listen on {host} instead of {LOOPBACK}")
         try:
             bound.listen()  # a browser that comes before the server is up waits
-        except OSError:  # another program has taken the port meanwhile
+            self._kept_free = _keep_free(bound.getsockname()[1])
+        except OSError:  # another program has the port
             bound.close()
             bound = socket.create_server((LOOPBACK, 0))
+            self._kept_free = _keep_free(bound.getsockname()[1])
         gated = _GatedSocket(fileno=bound.detach())
         self.gate = gated.gate = Gate(gated.getsockname()[1])
         self._checked_socket = gated
+
+
+def _keep_free(port: int) -> socket.socket | None:
+    """Take a port of the other loopback address, so that nobody listens there.
+
+    Browsers would ask there first, and give the token away.
+
+    Raises:
+        OSError: If somebody has it.
+    """
+    try:
+        taken = socket.socket(socket.AF_INET6, socket.SOCK_STREAM)
+    except OSError:  # a machine without IPv6
+        return None
+    try:
+        taken.bind(("::1", port))
+    except OSError as error:
+        taken.close()
+        if error.errno == errno.EADDRNOTAVAIL:  # likewise
+            return None
+        raise
+    return taken
 
 
 class Panel(plugin.ViewerPlugin):  # type: ignore[misc]
@@ -150,18 +174,18 @@ class Panel(plugin.ViewerPlugin):  # type: ignore[misc]
 class Page:
     """Serves a page on this machine that shows the jump; answers a worker's requests.
 
-    Studio's native threads can bring down their process where a viewer ends, or meets the remains
-    of another: let no other thing live there.
-
-    Attributes:
-        address: Where the page is; whoever has it can open it.
+    Studio's native threads can bring down their process, or hang it, where a viewer ends or meets
+    the remains of another: let nothing else live there.
     """
 
-    def __init__(self, model: Any) -> None:
-        """Start the server, at the first free port from 8080.
+    def open(self, model: Any) -> str:
+        """Start the server, at the first free port from 8080 if there is one.
 
         Args:
             model: The model to show.
+
+        Returns:
+            Where the page is; whoever has it can open it.
 
         Raises:
             OSError: If the server does not come up, or would let anybody in.
@@ -197,21 +221,23 @@ class Page:
         if isinstance(outcome, BaseException):
             raise outcome
         check(outcome.gate)
-        self.address = outcome.gate.address
         # The viewer has this model already.
         self._handle.model, self._handle.data = self._stage.model, self._stage.data
+        return outcome.gate.address
 
-    def __call__(self, scene: Scene | None) -> str | list[Command]:
-        """Bring the page up to date; returns what the user asked for, or for None the address."""
-        if scene is None:
-            return self.address
+    def show(self, state: Array, caption: Caption) -> list[Command]:
+        """Bring the page up to date; returns what the user asked for."""
         if not self._handle.is_running():
             return [Command.QUIT]
-        self._stage.state[:], self._panel.caption = scene
+        self._stage.state[:], self._panel.caption = state, caption
         self._stage.set()
         self._handle.sync()
         return self._commands.take()
 
+    def __call__(self, request: Any) -> str | list[Command]:
+        """Answer a request: a model is opened, a state with its caption shown."""
+        return self.show(*request) if isinstance(request, tuple) else self.open(request)
+
     def close(self) -> None:
-        """Stop the server."""
-        self._handle.close()
+        """End this process at once: Studio's own end can hang."""
+        os._exit(0)

@@ -94,7 +94,6 @@ class Screen(ABC):
             model: The model to show.
         """
         self._stage = Stage(model)
-        self._commands = CommandQueue()
 
     def show(self, data: Any) -> None:
         """Show the present state of ``data`` from the next refresh on."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.simulation.opengl import has_display
-from icub_jump_env.simulation.viewers.screen import Caption, Command, Screen
+from icub_jump_env.simulation.viewers.screen import Caption, Command, CommandQueue, Screen
 
 CLOSING_TIME = 5.0
 """Longest time (s) to wait for a window to close."""
@@ -34,6 +34,7 @@ class WindowScreen(Screen):
         import mujoco.viewer
 
         super().__init__(model)
+        self._commands = CommandQueue()
         self._keys = {
             glfw.KEY_SPACE: Command.PAUSE,
             glfw.KEY_RIGHT: Command.STEP,
