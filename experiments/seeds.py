@@ -26,8 +26,7 @@ TEST = range(4000, 4500)
 """Held out: reported, and nothing is chosen on them.
 
 Seeds 2000 to 2499 were the test seeds before. Their results had been seen when a rule of
-:mod:`experiments.frontier` was changed, so they are held out no longer; the results in the cards
-of the shipped policies, which were chosen earlier, are of those seeds.
+:mod:`experiments.frontier` was changed, so they are held out no longer.
 """
 
 FELT_TEST = range(7000, 7500)
@@ -54,7 +53,9 @@ The velocity controller was changed after both had been judged on the seeds of t
 of which no bit changed.
 """
 
-# Seeds from 20000 to 20999 are the jump benchmark's: icub_jump_env/benchmark/cases.py.
+# Others were jumped for tables and demonstrations: 1000 to 1199 (robots and worlds), 5900 to 5929 and 6000 to 6829
+# (landing), 12000 to 12499 (policies). Seeds from 20000 to 20999 are the jump benchmark's:
+# icub_jump_env/benchmark/cases.py.
 
 FORESIGHT_TEST = range(5425, 5550)
 """Held out from everything that chose when an episode may end early.
