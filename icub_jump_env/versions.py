@@ -22,5 +22,16 @@ VERSIONS: Mapping[EnvName, Mapping[str, Any]] = MappingProxyType(
 )
 """Where their defaults are not those of :class:`icub_jump_env.config.JumpConfig`."""
 
+
+def env_of(config: Any) -> EnvName:
+    """The newest environment whose defaults a configuration has."""
+    fitting = [
+        name
+        for name, fields in VERSIONS.items()
+        if all(getattr(config, field) == value for field, value in fields.items())
+    ]
+    return fitting[-1]
+
+
 MAX_EPISODE_STEPS = 1_000_000
 """Guard only: every episode ends by itself."""

@@ -20,6 +20,7 @@ from icub_jump_env.evaluation.cli import guarded
 from icub_jump_env.evaluation.entry import EntryOptions, parse_entry
 from icub_jump_env.evaluation.quantities import CM, PERCENT
 from icub_jump_env.evaluation.report.output import check_writable, new_table, say, show
+from icub_jump_env.versions import env_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +61,8 @@ def _bench(arguments: Sequence[str]) -> None:
 
     check_writable("file", options.file)
     contender = options.contender()
-    name = options.name or f"{options.env}, {options.config.controller_name}, {contender.name}"
+    env = options.env if options.policy is None else env_of(options.config)
+    name = options.name or f"{env}, {options.config.controller_name}, {contender.name}"
     result = jump(options.config, name, contender, options.jobs, progress)
     result.write(options.file)
     show(console, details(result))

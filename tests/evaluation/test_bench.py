@@ -1,6 +1,7 @@
 """The benchmark: its episodes are those of the environment, and the command says so."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from icub_jump_env.benchmark.run import standing_height
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.fixture
@@ -41,7 +44,7 @@ def test_the_result_is_what_the_episodes_say(few, tmp_path, capsys):
     assert "ICubJump-v0, torque, baseline" in capsys.readouterr().out
 
 
-def test_a_policy_is_an_entry(few, tmp_path):
+def test_a_policy_is_an_entry(few, tmp_path, capsys):
     bench(["r.json", "--policy", "velocity", "--name", "ours [/x]"])
     result = Result.read(tmp_path / "r.json")
     assert result.source["policy"]["name"] == "velocity"
@@ -53,6 +56,18 @@ def test_a_policy_is_an_entry(few, tmp_path):
     ]
     assert result.scores["nominal"].rise == np.mean(rises)
     bench(["--table", "r.json"])  # its name is shown as it is
+    assert "ours [/x]" in capsys.readouterr().out
+    bench(["d.json", "--policy", "disturbed-torque"])
+    assert Result.read(tmp_path / "d.json").entry == "ICubJump-v1, torque, disturbed-torque"
+
+
+def test_the_leaderboard_has_all_that_was_entered():
+    page = (DOCS / "benchmark.md").read_text()
+    files = sorted((DOCS / "leaderboard").iterdir())
+    assert files
+    for file in files:
+        assert f"docs/leaderboard/{file.name}" in page
+        assert f"| {Result.read(file).entry} | `icub-jump bench" in page
 
 
 def test_no_experiment_uses_the_seeds_of_the_benchmark():
