@@ -6,11 +6,8 @@ import importlib
 import io
 import json
 import multiprocessing
-import os
 import re
-import signal
 import socket
-import subprocess
 import sys
 import threading
 import types
@@ -22,7 +19,7 @@ import psutil
 import pytest
 from conftest import jump
 from rich.console import Console
-from shows import SHORT, Clock
+from shows import PATIENCE, SHORT, Clock, get
 
 from icub_jump_env.errors import MissingDependencyError
 from icub_jump_env.evaluation.episodes.rollout import make_env, traced
@@ -31,7 +28,6 @@ from icub_jump_env.evaluation.modes.view import Playback, Show
 from icub_jump_env.simulation.viewers.screen import Command, CommandQueue
 from icub_jump_env.workers import WorkerError
 
-PATIENCE = 120.0
 BROWSER = "icub_jump_env.simulation.viewers.browser"
 
 
@@ -44,28 +40,6 @@ def listeners(screen):
     """Addresses that the process with the page listens on."""
     connections = psutil.Process(screen.server.process.pid).net_connections(kind="inet")
     return {(c.laddr.ip, c.laddr.port) for c in connections if c.status == psutil.CONN_LISTEN}
-
-
-def get(address, *files, headers=()):
-    """Status and content of a page, or of files that it asks for with its cookie.
-
-    Browsers take its name for this machine; not every resolver does.
-    """
-    url = urllib.parse.urlsplit(address)
-    here = url._replace(netloc=f"127.0.0.1:{url.port}").geturl()
-    headers = {"Host": url.netloc} | dict(headers)
-    cookies = urllib.request.HTTPCookieProcessor()
-    opener = urllib.request.build_opener(cookies)
-    answers = []
-    for place in (here, *(urllib.parse.urljoin(here, file) for file in files)):
-        request = urllib.request.Request(place, headers=headers)
-        try:
-            with opener.open(request, timeout=PATIENCE) as answer:
-                answers.append((answer.status, answer.read()))
-        except urllib.error.HTTPError as refusal:
-            with refusal:
-                answers.append((refusal.status, refusal.read()))
-    return answers if files else answers[0]
 
 
 @pytest.fixture
@@ -153,54 +127,6 @@ def test_a_crash_of_studio_is_an_error_here(plain_model, browser_screen, monkeyp
         pytest.raises(WorkerError, match=says),
     ):
         screen.refresh({})
-
-
-PROGRAM = """
-from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.modes import view
-from rich.console import Console
-import careless_pages
-from icub_jump_env.simulation.viewers import browser
-
-browser.Page = careless_pages.HangingPage
-view.in_browser = lambda: True
-"""
-SHOW = "view.view(JumpConfig(), 0, Console())"
-GUARDED = f"if __name__ == '__main__':\n    {SHOW}\n"
-
-
-@contextlib.contextmanager
-def program(text, folder):
-    """A running program that shows a jump."""
-    pytest.importorskip(BROWSER)
-    file = folder / "program.py"
-    file.write_text(PROGRAM + text)
-    environment = os.environ | {"PYTHONUNBUFFERED": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
-    with subprocess.Popen(
-        [sys.executable, file],
-        env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-@pytest.mark.fault("killed workers")
-def test_the_page_ends_with_its_program(tmp_path):
-    with program(GUARDED, tmp_path) as process:
-        assert process.stdout.readline().startswith("open ")
-        children = psutil.Process(process.pid).children()
-        process.kill()
-        assert psutil.wait_procs(children, PATIENCE)[1] == []
-
-
-def test_an_unguarded_program_is_told_why_it_shows_nothing(tmp_path):
-    with program(SHOW, tmp_path) as process:
-        _, complaint = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 1
-    assert "if __name__ == '__main__'" in complaint
-    assert "WorkerError: the live view died (exit code 1)" in complaint
 
 
 @pytest.mark.fault("foreign pages")
@@ -392,30 +318,3 @@ def test_a_missing_studio_names_the_remedy(plain_model, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco.studio", None)
     with pytest.raises(MissingDependencyError, match=r"MuJoCo Studio .* pip install mujoco"):
         view.open_screen(plain_model, True, Console(file=io.StringIO()))
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a child alone")
-def test_ctrl_c_ends_the_show_without_a_complaint():
-    pytest.importorskip("icub_jump_env.simulation.viewers.browser")
-    program = (
-        "from rich.console import Console\n"
-        "from icub_jump_env.config import JumpConfig\n"
-        "from icub_jump_env.evaluation.modes import view\n"
-        "view.in_browser = lambda: True\n"
-        "view.view(JumpConfig(), 0, Console())\n"
-        "print('ended')\n"
-    )
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-    with subprocess.Popen(
-        [sys.executable, "-c", program],
-        env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
-        try:
-            address, keys = process.stdout.readline(), process.stdout.readline()
-            assert get(address.split()[1])[0] == 200
-            process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=PATIENCE)
-        finally:
-            process.kill()
-    assert "Backspace: replay" in keys
-    assert (process.returncode, out, err) == (0, "ended\n", "")
