@@ -19,6 +19,7 @@ from rich.console import Console
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
+from icub_jump_env.evaluation.figures.paper import WIDTH
 from icub_jump_env.evaluation.figures.snapshots import (
     STRIP_WIDTH,
     Shot,
@@ -339,6 +340,10 @@ def test_a_browser_shows_the_page(browser, page, width, scheme):
     assert script("return innerWidth") == width
     assert script("return document.documentElement.scrollWidth") <= width
     assert script("return [...document.images].filter(i => !i.naturalWidth).length") == 0
+    drawings = "[...document.querySelectorAll('.drawing img')].map(i => i.getBoundingClientRect())"
+    assert script(f"return {drawings}.filter(b => b.left < 0 || b.right > innerWidth).length") == 0
+    # Letters of 10 points are at least 8 pixels high.
+    assert script(f"return Math.min(...{drawings}.map(b => b.width))") >= 0.6 * 96 * WIDTH
     headings = script("return [...document.querySelectorAll('h1, h2')].map(h => h.innerText)")
     assert len(headings) == 6
     assert all(headings)

@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.failures import Failure
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.evaluation.episodes.series import perturbed, varies
+from icub_jump_env.evaluation.figures.sweep import sweep_figure
 from icub_jump_env.evaluation.modes import cases, study, sweep
 from icub_jump_env.evaluation.modes.study import STUDIES, CaseResult
 from icub_jump_env.evaluation.options import EvalOptions
@@ -245,3 +247,18 @@ class TestSweep:
         sweep.run(EvalOptions(config, sweep=True), (), console, progress)
         rise = 100 * jump(momentum_control=False, stand_time=1.5).jump["flight_height"]
         assert f"({rise:.2f})" in console.file.getvalue()
+
+    def test_the_figure_says_the_same(self):
+        found = {
+            (controller, height, 0.1): SimpleNamespace(
+                jump={"flight_height": height, "flight_rotation": turned, "landed": landed}
+            )
+            for controller in ("velocity", "torque")
+            for height, turned, landed in ((0.02, -0.0001, True), (0.03, 0.1, False))
+        }
+        figure = sweep_figure(found)
+        panels = [[text.get_text() for text in axis.texts] for axis in figure.axes[:4]]
+        assert panels == [["2.0", "(3.0)"]] * 2 + [["0.0", "(5.7)"]] * 2
+        assert figure.get_suptitle() == "in brackets: fell"
+        stood = {cell: episode for cell, episode in found.items() if episode.jump["landed"]}
+        assert sweep_figure(stood).get_suptitle() == "lands in every cell"

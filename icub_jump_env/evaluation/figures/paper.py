@@ -38,6 +38,9 @@ from icub_jump_env.snapshot import Snapshot
 
 Trace = Sequence[Snapshot]
 
+WIDTH = 5.0
+"""Of a figure (inches): its letters can be read on the screen of a phone, too."""
+
 
 def paper_figures(
     config: JumpConfig, episodes: Mapping[str, Episode], seed: int
@@ -63,14 +66,15 @@ def com_reference_figure(config: JumpConfig) -> Figure:
     """Fig. 1: vertical CoM reference, velocity and acceleration."""
     plan = planned(config)
     time = np.linspace(0.0, plan.duration, 400)
-    figure, ((velocity, acceleration),) = panels((8.0, 3.2), columns=2)
+    figure, ((velocity, acceleration),) = panels((WIDTH, 2.6), columns=2)
     velocity.plot(time, [plan.sample(t).com_velocity[2] for t in time], color=DESIRED)
     describe(velocity, "vertical CoM velocity", "m/s")
     acceleration.plot(time, [plan.sample(t).com_acceleration[2] for t in time], color=DESIRED)
     describe(acceleration, "vertical CoM acceleration", "m/s²")
     figure.suptitle(
         f"Fig. 1: CoM reference, {commands(*config.jump_heights)} jump, "
-        f"{CM * plan.displacement:.3g} cm displacement"
+        f"{CM * plan.displacement:.3g} cm displacement",
+        fontsize=11,
     )
     return figure
 
@@ -98,12 +102,15 @@ _LAUNCH: dict[ControllerName, _Shown] = {
 def launch_figure(config: JumpConfig, trace: Trace) -> Figure:
     """Fig. 2 (joint velocities) or Fig. 3 (joint torques) and CoM height, desired and measured."""
     shown = _LAUNCH[config.controller_name]
-    figure, ((*joints, height),) = panels((13.0, 3.4), columns=4)
+    figure, axes = panels((WIDTH, 4.6), 2, 2)
+    *joints, height = axes.flat
     _draw_joints(joints, config, trace)
     _draw_height(height, config, trace)
+    _add_legend(figure)
     duration = planned(config).duration
     figure.suptitle(
-        f"{shown.figure}: {config.controller_name} approach, take-off commanded at {duration:.2f} s"
+        f"{shown.figure}: {config.controller_name} approach, take-off commanded at {duration:.2f} s",
+        fontsize=11,
     )
     return figure
 
@@ -127,13 +134,16 @@ def robot_figure(config: JumpConfig, episode: Episode) -> Figure:
     As in the paper the CoM is the one estimated from the encoders as if the feet stood
     still, which means nothing after take-off; the true one is drawn beside it.
     """
-    figure, ((*joints, height),) = panels((13.0, 3.4), columns=4)
+    figure, axes = panels((WIDTH, 4.6), 2, 2)
+    *joints, height = axes.flat
     robot = realistic(config)
     _draw_joints(joints, robot, episode.trace)
     _draw_height(height, robot, episode.trace, estimated=True)
+    _add_legend(figure, estimated=True)
     figure.suptitle(
-        "Fig. 4: simulation with realistic actuators and sensors, velocity approach "
-        "(the paper shows the real robot)"
+        "Fig. 4: velocity approach, realistic actuators and sensors\n"
+        "(the paper shows the real robot)",
+        fontsize=11,
     )
     return figure
 
@@ -154,9 +164,6 @@ def _draw_joints(axes: Sequence[Axes], config: JumpConfig, trace: Trace) -> None
             sign = np.sign(measured[launch][-1])
             axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":")
         describe(axis, f"left {joint.replace('_', ' ')}", shown.unit)
-    styles = (("measured", MEASURED, "-"), ("desired", DESIRED, "--"), ("limit", ACCENT, ":"))
-    handles = [Line2D([], [], color=color, ls=ls, label=label) for label, color, ls in styles]
-    axes[0].legend(handles=handles, frameon=False)
 
 
 def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool = False) -> None:
@@ -165,21 +172,31 @@ def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool =
     time = [s.time for s in early]
     true = [s.com[2] for s in early]
     if estimated:
-        axis.plot(time, [s.com_estimate[2] for s in early], color=MEASURED, label="estimated")
-        axis.plot(time, true, color=ACCENT, label="true")
+        axis.plot(time, [s.com_estimate[2] for s in early], color=MEASURED)
+        axis.plot(time, true, color=ACCENT)
     else:
         axis.plot(time, true, color=MEASURED)
     axis.plot(time, [s.com_reference[2] for s in early], color=DESIRED, ls="--")
     mark_takeoff(axis, duration)
     axis.annotate("T", (duration, min(true)), color=ACCENT, ha="left")
     describe(axis, "CoM height", "m")
+
+
+def _add_legend(figure: Figure, estimated: bool = False) -> None:
+    styles = [("desired", DESIRED, "--"), ("limit; T: take-off", ACCENT, ":")]
+    styles.insert(0, ("estimated" if estimated else "measured", MEASURED, "-"))
     if estimated:
-        axis.legend(frameon=False)
+        styles.insert(1, ("true", ACCENT, "-"))
+    handles = [Line2D([], [], color=color, ls=ls, label=label) for label, color, ls in styles]
+    figure.legend(
+        handles=handles, frameon=False, loc="outside lower center",
+        ncols=4, columnspacing=1.0, fontsize=9,
+    )  # fmt: skip
 
 
 def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
     """Fig. 6: base pitch with and without the momentum constraint."""
-    figure, ((axis,),) = panels((6.5, 3.6))
+    figure, ((axis,),) = panels((WIDTH, 3.2))
     takeoffs = [episode.jump["takeoff_time"] for episode in episodes.values()]
     takeoff = min((t for t in takeoffs if not math.isnan(t)), default=math.inf)
     fallen = [e.trace[-1].time for e in episodes.values() if e.outcome == "fell"]
@@ -209,5 +226,5 @@ def base_pitch_figure(episodes: Mapping[str, Episode]) -> Figure:
         )
     describe(axis, "", "deg")
     axis.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    figure.suptitle("Fig. 6: base pitch (positive: forward)")
+    figure.suptitle("Fig. 6: base pitch (positive: forward)", fontsize=11)
     return figure
