@@ -112,13 +112,22 @@ def passes(tests: Sequence[str], copy: Path) -> bool:
     return ran.returncode == 0
 
 
+def tests_of(mutant: Mutant) -> list[str]:
+    """Files of tests of a mutant's package; first those that name its module, the shorter before."""
+    name = ".".join(Path(mutant.module).with_suffix("").parts)
+    files = sorted((REPOSITORY / "tests" / mutant.package).glob("test_*.py"))
+    code = {file: file.read_text() for file in files}
+    files.sort(key=lambda file: (name not in code[file], len(code[file])))
+    return [str(file.relative_to(REPOSITORY)) for file in files]
+
+
 def is_noticed(mutant: Mutant, copy: Path) -> bool:
     """Whether a test fails in a copy of the repository with a mutant."""
     file = copy / mutant.module
     code = file.read_text()
     file.write_text(mutated(mutant.module, mutant.operator, mutant.occurrence))
     try:
-        return not (passes([f"tests/{mutant.package}"], copy) and passes(OTHERS, copy))
+        return not (passes(tests_of(mutant), copy) and passes(OTHERS, copy))
     finally:
         file.write_text(code)
 
