@@ -35,7 +35,7 @@ from icub_jump_env.evaluation.statistics.summary import Rate
 REPOSITORY = Path(__file__).parents[2]
 PACKAGES = ("control", "estimation", "metrics", "planning")
 OTHERS = ("tests/simulation", *(f"tests/test_{name}.py" for name in (
-    "nominal", "env", "env_controllers", "env_episode_end", "env_determinism", "env_series", "residual_phases", "versions",
+    "recorded", "nominal", "env", "env_controllers", "env_episode_end", "env_determinism", "env_series", "residual_phases", "versions",
 )))  # fmt: skip
 """Tests of what the packages do together."""
 LONGEST = 900.0
