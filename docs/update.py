@@ -1,9 +1,10 @@
 """Run the commands named in the documents and put their output below them.
 
-A block of a document starts with a comment that holds a command and ends with the
-fenced block that shows its output:
+A block of a document is a line that holds a command alone, and the fenced block or table that shows its
+output:
 
-    <!-- python eval.py -->
+    `python eval.py`
+
     (fenced block)
 
     python docs/update.py
@@ -24,9 +25,9 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 REPOSITORY = DOCS.parent
 BLOCK = re.compile(
-    r"<!-- (?P<command>python [^\n]*?) -->\n"
+    r"^`(?P<command>python [^`\n]*)`\n\n"
     r"(?:(?P<fence>```)\n.*?(?<=\n)```\n|(?:\|[^\n]*\n)+)",
-    re.DOTALL,
+    re.DOTALL | re.MULTILINE,
 )
 """A command and, below it, a fenced block or a table."""
 
@@ -49,7 +50,7 @@ def fresh(block: re.Match[str], output: Callable[[str], str] = output_of) -> str
     command, fence = block["command"], block["fence"] or ""
     body = output(command)
     shown = f"{fence}\n{body}\n{fence}" if fence else body
-    return f"<!-- {command} -->\n{shown}\n"
+    return f"`{command}`\n\n{shown}\n"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
