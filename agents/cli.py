@@ -16,11 +16,6 @@ from icub_jump_env.workers import WorkerError
 
 from .options import OPTIONS, TrainOptions, read_options
 
-_REMEDY = (
-    "training needs the extra 'rl', in the repository's folder: "
-    'pip install -c constraints.txt -e ".[rl]"'
-)
-
 
 def run(arguments: Sequence[str]) -> None:
     """Run train.py with these arguments."""
@@ -37,7 +32,7 @@ def _run(arguments: Sequence[str]) -> None:
     try:
         from .training import train
     except ImportError as error:
-        raise MissingDependencyError(_REMEDY) from error
+        raise MissingDependencyError.of_extra("training", "rl") from error
     console = Console(stderr=True)
     several = options.seeds is not None or options.cluster is not None
     try:

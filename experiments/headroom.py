@@ -3,8 +3,8 @@
     python -m experiments.headroom --jobs 2
 
 Each episode is jumped with each action of a grid: in the launch, or in all phases where something
-happens after it. The best constant and the best law are chosen on one half of the tuning seeds, and
-all arms are compared on the other half. A law moves one axis by a constant and a multiple of the lean
+happens after it. The best constant and the best line are chosen on one half of the tuning seeds, and
+all arms are compared on the other half. A line moves one axis by a constant and a multiple of the lean
 that the IMU feels as the jump begins. Hindsight takes for each episode what succeeds in it: an action
 from its beginning on, or one that begins with the push of the launch. It counts an action only if its
 neighbour of the same axis succeeds, too, so that luck alone does not.
@@ -68,7 +68,7 @@ GRID: Mapping[str, tuple[float, ...]] = MappingProxyType(
 )
 """Constant actions, one axis at a time."""
 
-LAWS: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...] = (
+LINES: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...] = (
     ("forward", (0.0, 0.2, 0.4), (-4.0, -2.0, 2.0, 4.0)),
     ("pitch", (0.0, 0.15), (-3.0, -2.0, -1.0, 2.0)),
     ("lateral", (0.0,), (-6.0, -3.0, 3.0, 6.0)),
@@ -198,11 +198,11 @@ def constants(after_push: bool = False) -> list[Line]:
     ]
 
 
-def laws() -> list[Line]:
+def lines() -> list[Line]:
     """The lines over the lean that are tried."""
     return [
         Line(axis, *pair)
-        for axis, offsets, gains in LAWS
+        for axis, offsets, gains in LINES
         for pair in itertools.product(offsets, gains)
     ]
 
@@ -241,8 +241,8 @@ def measure(config: JumpConfig, episodes: int, jobs: int, progress: Console) -> 
         success = play(lines, first)
         return max(lines, key=lambda line: (success[line].mean(), -abs(line.offset)))
 
-    constant, law = best(constants()), best(laws())
-    success = play([ZERO, constant, law], second)
+    constant, line = best(constants()), best(lines())
+    success = play([ZERO, constant, line], second)
     zero = success[ZERO]
     lost = [seed for seed, succeeds in zip(second, zero, strict=True) if not succeeds]
     saved = {}
@@ -252,10 +252,10 @@ def measure(config: JumpConfig, episodes: int, jobs: int, progress: Console) -> 
     return {
         "zero": zero,
         "constant": success[constant],
-        "law": success[law],
+        "line": success[line],
         **saved,
         "chosen constant": constant,
-        "chosen law": law,
+        "chosen line": line,
     }
 
 
@@ -264,12 +264,12 @@ def render(
 ) -> Table:
     """The table of a version."""
     table = new_table(
-        2, "regime", "controller", "zero", "constant", "", "law", "", "hindsight",
+        2, "regime", "controller", "zero", "constant", "", "line", "", "hindsight",
         "after the push",
         title=f"Success, %, {options.env}, 4 to 6 cm, {seeds(TUNING[: 2 * options.episodes])}, every other",
     )  # fmt: skip
     for (regime, controller), found in results.items():
-        constant, law = found["chosen constant"], found["chosen law"]
+        constant, line = found["chosen constant"], found["chosen line"]
         percent = {
             name: f"{PERCENT * np.mean(values):.0f}"
             for name, values in found.items()
@@ -278,7 +278,7 @@ def render(
         table.add_row(
             regime, controller, percent["zero"],
             percent["constant"], "zero" if constant == ZERO else f"{constant.axis} {constant.offset:+g}",
-            percent["law"], "zero" if law == ZERO else f"{law.axis} {law.offset:+g} {law.gain:+g} lean",
+            percent["line"], "zero" if line == ZERO else f"{line.axis} {line.offset:+g} {line.gain:+g} lean",
             percent["hindsight"], percent["after the push"],
         )  # fmt: skip
     return table

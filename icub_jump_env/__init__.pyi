@@ -17,6 +17,7 @@ from .errors import (
     UnknownFieldError,
 )
 from .metrics.jump import SuccessConfig
+from .observation import ObservationConfig
 from .planning.residual import ResidualConfig
 from .reward import RewardConfig
 from .simulation.actuators.config import ActuatorConfig
@@ -48,6 +49,7 @@ __all__ = [
     "InvalidValueError",
     "JumpConfig",
     "MissingDependencyError",
+    "ObservationConfig",
     "PhaseConfig",
     "Randomization",
     "RatedMotor",

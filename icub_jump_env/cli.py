@@ -77,6 +77,7 @@ def main() -> None:
     if name not in _COMMANDS:
         print(f"error: {name!r} is none of {', '.join(_COMMANDS)}", file=sys.stderr)
         sys.exit(2)
+    sys.argv = [f"icub-jump {name}", *arguments]  # what help and results say
     try:
         _COMMANDS[name](arguments)
     except KeyboardInterrupt:  # while Python still imports

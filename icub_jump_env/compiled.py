@@ -51,7 +51,7 @@ class _Word(event.Listener):
     def on_start(self, event: event.Event) -> None:
         function = event.data["dispatcher"].py_func
         if not self._said and function.__module__.partition(".")[0] == _PACKAGE:
-            print(f"{_PACKAGE}: compiling, once for this installation", file=sys.stderr)
+            print(f"{_PACKAGE}: compiling, once for each kind of jump", file=sys.stderr)
             self._said = True
 
     def on_end(self, event: event.Event) -> None:

@@ -46,7 +46,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     with a humanoid robot") launches the robot along a CoM trajectory scaled to the commanded height,
     retracts the feet in flight and holds a posture to land: v0. In v1 the launch follows whole-body
     plans, an IMU says where the robot is in the air, and feedback places the feet and catches the
-    landing. The baseline needs no agent: action zero is the pure controller, bit for bit.
+    landing. The baseline needs no agent: action zero is what it does, bit for bit.
 
     ## Action space
     ``Box(-1, 1, (n,), float32)``: target offset of the set point along each of ``residual_axes`` in
@@ -91,7 +91,7 @@ class ICubJumpEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Version history
     * v1: the same with other defaults: ``planner="whole_body"``, ``estimator="imu"``,
-      ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.versions.VERSIONS`).
+      ``lean_correction=True``, ``flight="feedback"``, ``landing="feedback"`` (:data:`icub_jump_env.versions.VERSIONS`).
     * v0: the paper's jump. It stays as it is, whatever Gymnasium says of newer ones.
     """
 

@@ -9,6 +9,9 @@ _LONGEST_VALUE = 500
 _LONGEST_MESSAGE = 2000
 """Characters that are shown of a value, and of a message."""
 
+_REFUSALS = ("not ", "no ", "only ", "left to ")
+"""How what is allowed begins where it says when a value is not."""
+
 _values = reprlib.Repr()
 _values.maxlist = _values.maxtuple = _values.maxset = _values.maxfrozenset = 30
 _values.maxdict = 30
@@ -54,12 +57,11 @@ class InvalidValueError(ICubJumpError, ValueError):
     """
 
     def __init__(self, field: str, value: Any = None, allowed: str | None = None) -> None:
-        # Gymnasium's asynchronous vector environment re-raises with the message alone.
-        super().__init__(
-            field
-            if allowed is None
-            else f"{one_line(field, _LONGEST_VALUE)}={shown(value)} is not allowed: {allowed}"
-        )
+        message = field  # alone, as Gymnasium's asynchronous vector environment raises it again
+        if allowed is not None:
+            reason = allowed if allowed.startswith(_REFUSALS) else f"expected {allowed}"
+            message = f"{one_line(field, _LONGEST_VALUE)}={shown(value)} is not allowed: {reason}"
+        super().__init__(message)
         self.field = field
         self.value = value
         self.allowed = allowed
@@ -94,6 +96,12 @@ class HeightNotReachableError(ConfigError):
 
 class MissingDependencyError(ICubJumpError, RuntimeError):
     """An optional package or a system library is missing; the message names the remedy."""
+
+    @classmethod
+    def of_extra(cls, purpose: str, extra: str) -> MissingDependencyError:
+        """What is missing comes with an extra of this package."""
+        remedy = f'in the repository\'s folder: pip install -c constraints.txt -e ".[{extra}]"'
+        return cls(f"{purpose} needs the extra {extra!r}, {remedy}")
 
 
 class FileError(ICubJumpError, ValueError):

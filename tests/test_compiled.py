@@ -16,7 +16,7 @@ OUTER = (
     "@compiled\n"
     "def outer(x): return 10.0 * inner(x)\n"
 )
-SAID = "package: compiling, once for this installation\n"
+SAID = "package: compiling, once for each kind of jump\n"
 
 
 @pytest.fixture

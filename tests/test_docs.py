@@ -37,7 +37,9 @@ def test_regenerating_changes_only_the_blocks(document):
 
     once = updated(text)
     assert updated(once) == once
-    assert once.count("new |") + once.count("last, new") == len(re.findall("^`python [^`]*`$", text, re.M))
+    assert once.count("new |") + once.count("last, new") == len(
+        re.findall("^`python [^`]*`$", text, re.M)
+    )
     assert update.BLOCK.sub("", once) == update.BLOCK.sub("", text)
 
 

@@ -184,7 +184,7 @@ class TestBadInput:
     def test_errors_can_be_raised_again_from_their_message(self):
         """As Gymnasium's asynchronous vector environment does it."""
         error = ActionError(str(ActionError("action", None, "three numbers")))
-        assert str(error) == "action=None is not allowed: three numbers"
+        assert str(error) == "action=None is not allowed: expected three numbers"
         assert str(pickle.loads(pickle.dumps(error))) == str(error)
 
     @pytest.mark.parametrize(
@@ -218,4 +218,4 @@ class TestBadInput:
         for kind in (ActionError, ConfigError):
             error = pickle.loads(pickle.dumps(kind("field", 3, "less")))
             assert (error.field, error.value, error.allowed) == ("field", 3, "less")
-            assert str(error) == "field=3 is not allowed: less"
+            assert str(error) == "field=3 is not allowed: expected less"

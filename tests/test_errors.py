@@ -82,7 +82,7 @@ def test_unknown_fields_with_any_name():
 
 def test_short_values_are_shown_whole():
     command = tuple(f"policy-{number}" for number in range(20))
-    assert str(ConfigError("a", command, "less")) == f"a={command!r} is not allowed: less"
+    assert str(ConfigError("a", command, "less")) == f"a={command!r} is not allowed: expected less"
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_every_error_is_clean_and_stays_so_in_another_process(error):
 
 def test_results_nested_too_deep_are_refused():
     with pytest.raises(
-        ConfigError, match=r"^results=\[.* is not allowed: nested at most 32 deep$"
+        ConfigError, match=r"^results=\[.* is not allowed: expected nested at most 32 deep$"
     ):
         check_results("results", nested(100_000))
 

@@ -212,17 +212,6 @@ def test_installed_command_evaluates_and_trains(site):
     assert "ankle_shift=False instead of True" in result.stderr
 
 
-def test_installed_wheel_jumps(site):
-    program = (
-        "import gymnasium, numpy as np\n"
-        "env = gymnasium.make('ICubJump-v0', stand_time=0.2); env.reset(seed=0); done = False\n"
-        "while not done:\n"
-        "    *_, done, _, info = env.step(np.zeros(3, np.float32))\n"
-        "assert info['is_success']\n"
-    )
-    run_installed(site, program)
-
-
 def pinned(name):
     """Versions in a file of requirements, by package."""
     text = (REPOSITORY / name).read_text()

@@ -13,7 +13,8 @@ from nbclient import NotebookClient
 REPOSITORY = Path(__file__).parents[1]
 DOCS = REPOSITORY / "docs"
 TUTORIALS = sorted((DOCS / "tutorials").glob("*.ipynb"))
-PAGES = [DOCS / "index.md", *sorted((DOCS / "howto").glob("*.md"))]
+WITH_CODE = ("index", "environment", "controller", "planning", "landing", "simulation", "learning")
+PAGES = [*(DOCS / f"{name}.md" for name in WITH_CODE), *sorted((DOCS / "howto").glob("*.md"))]
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 

@@ -88,9 +88,17 @@ def parse(kind: type[T], arguments: Sequence[str], default: T | None = None) -> 
     except SystemExit as end:
         page.seek(0)
         if end.code in (0, None):
-            print(page.read(), end="")
+            print(*map(_without_markup, page.read().splitlines()), sep="\n")
             raise
         _fail(_one_line(page.read()))
+
+
+def _without_markup(line: str) -> str:
+    """A line of the help, which is made of docstrings, as wide as before."""
+    plain = re.sub(r":\w+:(?=`)|`", "", line)
+    if plain.endswith("│"):
+        plain = f"{plain[:-1]}{' ' * (len(line) - len(plain))}│"
+    return plain
 
 
 def seek(arguments: Sequence[str], *flags: str) -> dict[str, list[str]]:

@@ -81,13 +81,13 @@ class EvalOptions:
             constraint, what ends the launch, the robot; how flight and landing are controlled,
             under disturbances of several sizes.
         sweep: Desired height against displacement, for both controllers.
-        max_height: The highest whole-body plan and the highest jump that stands, for both
+        max_height: The highest whole-body plan and the rise with the highest that stands, for both
             controllers, with what binds.
         report: Write one self-contained HTML page into this folder (extra 'video').
         view: Show the jump live, in the browser or in a window.
         results: Where an evaluation of several episodes keeps them as they come; by
             default a file in results/.
-        resume: Finish an interrupted evaluation.
+        resume: Finish an interrupted evaluation; without one, begin it.
         json: Write everything to this file.
         plot: Draw the figures into this folder.
         video: Record the jump to this file, such as jump.mp4 (extra 'video').

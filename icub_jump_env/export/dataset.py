@@ -42,7 +42,7 @@ def write_dataset(
         from minari.data_collector import EpisodeBuffer
         from minari.dataset.minari_dataset import parse_dataset_id
     except ImportError:
-        raise MissingDependencyError("a dataset needs the extra 'export'") from None
+        raise MissingDependencyError.of_extra("a dataset", "export") from None
     try:
         parse_dataset_id(name)
     except (ValueError, TypeError) as error:

@@ -39,7 +39,7 @@ def write_onnx(policy: LoadedPolicy, path: Path) -> None:
     try:
         import onnx
     except ImportError:
-        raise MissingDependencyError("ONNX needs the extra 'export'") from None
+        raise MissingDependencyError.of_extra("ONNX", "export") from None
     model = onnx.helper.make_model(
         _graph(network, onnx.helper),
         producer_name="icub_jump_env",

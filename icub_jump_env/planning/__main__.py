@@ -49,7 +49,7 @@ class PlanningOptions:
 def make_plans(options: PlanningOptions) -> None:
     """Optimise, calibrate and write the family."""
     if importlib.util.find_spec("casadi") is None:
-        raise MissingDependencyError("making plans needs CasADi: install the extra 'planning'")
+        raise MissingDependencyError.of_extra("making plans", "planning")
     from icub_jump_env.evaluation.calibration import calibrate
     from icub_jump_env.evaluation.report.output import new_table, say, show
     from icub_jump_env.planning.whole_body.build import build_family

@@ -255,7 +255,10 @@ def rewrite(folder, called=5, tensors=(), **fields):
 
 BIAS = "policy.action_net.bias"
 CONTENTS = {
-    "of another number": ({"number": 4}, "number=4 is not allowed: 5, as the file is called"),
+    "of another number": (
+        {"number": 4},
+        "number=4 is not allowed: expected 5, as the file is called",
+    ),
     "no number": ({"number": True}, "number=True"),
     "negative steps": ({"num_timesteps": -1}, "num_timesteps=-1"),
     "steps as text": ({"num_timesteps": "9"}, "num_timesteps='9'"),
@@ -266,10 +269,13 @@ CONTENTS = {
     "another version": ({"wings": 2}, "of another version"),
     "NaN": (
         {"tensors": {BIAS: np.array([np.nan], np.float32)}},
-        rf"{BIAS}=nan .*: finite numbers",
+        rf"{BIAS}=nan .*: expected finite numbers",
     ),
     "infinity": ({"tensors": {"optimizer.0.step": np.float32(np.inf)}}, "optimizer.0.step=inf"),
-    "doubles": ({"tensors": {BIAS: np.zeros(1)}}, f"{BIAS}='float64' is not allowed: float32"),
+    "doubles": (
+        {"tensors": {BIAS: np.zeros(1)}},
+        f"{BIAS}='float64' is not allowed: expected float32",
+    ),
     "other tensors": ({"tensors": {"wings": np.zeros(1, np.float32)}}, "tensors='wings'"),
 }
 
@@ -289,7 +295,7 @@ def test_one_called_by_another_number_is_passed_over(folder):
     rewrite(folder, 6)
     said = []
     assert load_latest(folder, said.append).number == 5
-    assert "number=5 is not allowed: 6, as the file is called" in said[0]
+    assert "number=5 is not allowed: expected 6, as the file is called" in said[0]
 
 
 @pytest.mark.fault("damaged files")

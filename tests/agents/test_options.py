@@ -60,18 +60,24 @@ def test_shortcuts_end_up_in_the_jump():
 
 
 CONTENTS = {
-    "nothing": ("", "config='options.json' is not allowed: a JSON file"),
-    "not text": (b"\xff\x00\xfe", "config='options.json' is not allowed: a JSON file"),
-    "nested": ("[" * 200_000, "config='options.json' is not allowed: a JSON file"),
-    "a list": ("[1, 2]", "config='options.json' is not allowed: a JSON object"),
+    "nothing": ("", "config='options.json' is not allowed: expected a JSON file"),
+    "not text": (b"\xff\x00\xfe", "config='options.json' is not allowed: expected a JSON file"),
+    "nested": ("[" * 200_000, "config='options.json' is not allowed: expected a JSON file"),
+    "a list": ("[1, 2]", "config='options.json' is not allowed: expected a JSON object"),
     "unknown": ('{"wings": 2}', "wings=2 is not allowed: no such field; the fields of config are"),
     "unknown below": ('{"ppo": {"wings": 2}}', "wings=2 is not allowed: no such field; the field"),
     "unknown jump": ('{"env": {"wings": 2}}', "wings=2 is not allowed: no such field; the fields"),
     "a folder": ('{"resume": "x"}', "resume='x' is not allowed: no such field"),
-    "no mapping": ('{"env": 3}', "env=3 is not allowed: a JSON object"),
-    "null": ('{"timesteps": null}', "timesteps=None is not allowed: a whole number from 1"),
-    "a fraction": ('{"seed": 0.5}', "seed=0.5 is not allowed: a whole number from 0"),
-    "not a number": ('{"ppo": {"gamma": NaN}}', "gamma=nan is not allowed: a number from 0 to 1"),
+    "no mapping": ('{"env": 3}', "env=3 is not allowed: expected a JSON object"),
+    "null": (
+        '{"timesteps": null}',
+        "timesteps=None is not allowed: expected a whole number from 1",
+    ),
+    "a fraction": ('{"seed": 0.5}', "seed=0.5 is not allowed: expected a whole number from 0"),
+    "not a number": (
+        '{"ppo": {"gamma": NaN}}',
+        "gamma=nan is not allowed: expected a number from 0 to 1",
+    ),
     "ragged": (
         '{"env": {"jump_height": [[1], [2, 3]]}}',
         "jump_height=[[1], [2, 3]] is not allow",
@@ -101,18 +107,30 @@ def test_a_missing_file_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"inputs": "some"}, "inputs='some' is not allowed: one of 'all', 'balance', 'command'"),
+        (
+            {"inputs": "some"},
+            "inputs='some' is not allowed: expected one of 'all', 'balance', 'command'",
+        ),
         ({"axes": ("vertical", "forward")}, "in this order"),
-        ({"timesteps": 0}, "timesteps=0 is not allowed: a whole number from 1 to 1000000000"),
-        ({"seed": 2**32}, "seed=4294967296 is not allowed: a whole number from 0 to 4294967295"),
-        ({"jobs": 0}, "jobs=0 is not allowed: a whole number from 1 to 1000"),
-        ({"checkpoint_every": 0}, "checkpoint_every=0 is not allowed: a whole number from 1"),
-        ({"jobs": 7}, "jobs=7 is not allowed: a divisor of ppo.episodes=64"),
+        (
+            {"timesteps": 0},
+            "timesteps=0 is not allowed: expected a whole number from 1 to 1000000000",
+        ),
+        (
+            {"seed": 2**32},
+            "seed=4294967296 is not allowed: expected a whole number from 0 to 4294967295",
+        ),
+        ({"jobs": 0}, "jobs=0 is not allowed: expected a whole number from 1 to 1000"),
+        (
+            {"checkpoint_every": 0},
+            "checkpoint_every=0 is not allowed: expected a whole number from 1",
+        ),
+        ({"jobs": 7}, "jobs=7 is not allowed: expected a divisor of ppo.episodes=64"),
         (
             {"env": JumpConfig.of(render_mode="rgb_array")},
             "render_mode='rgb_array' is not allowed",
         ),
-        ({"env": JumpConfig(jumps=2)}, "jumps=2 is not allowed: 1 in a training"),
+        ({"env": JumpConfig(jumps=2)}, "jumps=2 is not allowed: expected 1 in a training"),
     ],
 )
 def test_a_value_out_of_range_is_refused(changes, message):

@@ -170,7 +170,9 @@ def test_a_folder_with_checkpoints_alone_is_refused(refused):
 
 def test_a_damaged_record_of_the_options_is_refused(refused, run):
     Path("run/options.json").write_text('{"seed": 5')
-    assert "config='run/options.json' is not allowed: a JSON file" in refused("--resume", "run")
+    assert "config='run/options.json' is not allowed: expected a JSON file" in refused(
+        "--resume", "run"
+    )
 
 
 def test_a_missing_package_is_named_with_its_remedy(refused, monkeypatch):

@@ -303,9 +303,9 @@ def test_the_longest_curve_fits_into_a_checkpoint():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"updates": -1}, "updates=-1 is not allowed: a whole number from 0 updates"),
+        ({"updates": -1}, "updates=-1 is not allowed: expected a whole number from 0 updates"),
         ({"updates": None}, "updates=None"),
-        ({"curve": {}}, "curve={} is not allowed: a list of 2 evaluations"),
+        ({"curve": {}}, "curve={} is not allowed: expected a list of 2 evaluations"),
         ({"curve": [{"score": 1.0}]}, "a list of 2 evaluations"),
         ({"curve": [{"score": 1.0}, {}]}, "score=None"),
         ({"curve": [{"score": 1.0}, 3]}, "point of the curve=3"),

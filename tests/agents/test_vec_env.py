@@ -83,7 +83,9 @@ def test_the_workers_surroundings(start, monkeypatch):
 
 
 def test_a_wrong_number_of_seeds_is_refused(start):
-    with pytest.raises(InvalidValueError, match=r"^seeds=\[1, 2\] is not allowed: 1, one each$"):
+    with pytest.raises(
+        InvalidValueError, match=r"^seeds=\[1, 2\] is not allowed: expected 1, one each$"
+    ):
         start("none").reset_all([1, 2])
 
 

@@ -160,10 +160,10 @@ class TestLog:
         with pytest.raises(ConfigError, match="different: seeds"):
             EpisodeLog(log.path, self.header, resume=True)
 
-    def test_nothing_to_resume_is_refused(self, tmp_path):
-        with pytest.raises(ConfigError, match="a log that exists"):
-            EpisodeLog(tmp_path / "log.jsonl", self.header, resume=True)
-        assert not list(tmp_path.iterdir())
+    def test_with_nothing_to_resume_it_begins(self, tmp_path):
+        log = EpisodeLog(tmp_path / "log.jsonl", self.header, resume=True)
+        log.append(episode(0))
+        assert set(EpisodeLog(log.path, self.header, resume=True).episodes) == {0}
 
 
 STOPS = """

@@ -1,4 +1,4 @@
-"""``eval.py --max-height``: the highest jump that stands, and what binds there."""
+"""``eval.py --max-height``: the highest plan that stands, and what binds there."""
 
 import io
 import json
@@ -30,7 +30,7 @@ def run(**options):
 
 def test_the_command_prints_both_controllers(twice, tmp_path):
     out = run(json=tmp_path / "found.json", seed=3)
-    assert out.split()[:5] == ["The", "highest", "jump", "velocity", "torque"]
+    assert out.split()[:5] == ["The", "highest", "plan", "that", "stands"]
     found = json.loads((tmp_path / "found.json").read_text())
     for place, controller in enumerate(("velocity", "torque")):
         config = SHORT.for_controller(controller).replace(planner="whole_body")
@@ -38,12 +38,12 @@ def test_the_command_prints_both_controllers(twice, tmp_path):
         env = make_env(perturbed(config.replace(jump_height=family.highest)))
         rises = [run_episode(env, seed).jump["flight_height"] for seed in (3, 4)]
         rise = f"{50 * sum(rises):.2f}"
-        (row,) = [line for line in out.splitlines() if "highest jump that stands" in line]
+        (row,) = [line for line in out.splitlines() if "highest that stands, cm" in line]
         assert row.split()[-2 + place] == rise
         (row,) = [line for line in out.splitlines() if "of the physical optimum" in line]
         share = 50 * sum(rises) / family.optimum
         assert row.split()[-2 + place] == f"{share:.0f}"
-        (row,) = [line for line in out.splitlines() if "highest plan" in line]
+        (row,) = [line for line in out.splitlines() if "highest plan, cm" in line]
         assert row.split()[-2 + place] == f"{100 * family.card['plans'][-1]['height']:.2f}"
         assert found[controller]["plan"] == family.card["plans"][-1]
         assert found[controller]["share_of_optimum"] == pytest.approx(share / 100)

@@ -305,7 +305,7 @@ def test_refuses_before_any_work_where_it_cannot_write(idle, tmp_path):
 
 def test_refuses_before_any_work_without_the_extra(idle, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "imageio.v3", None)
-    with pytest.raises(MissingDependencyError, match="pip install imageio"):
+    with pytest.raises(MissingDependencyError, match="extra 'video'"):
         report.write_report(tmp_path / "new", CONFIG, 0, QUIET)
     assert not (tmp_path / "new").exists()
 

@@ -72,6 +72,12 @@ def test_no_difference_to_another_jump_than_the_papers():
     assert all(r.difference is None for r in comparison_rows(higher, [episode()], [episode()]))
 
 
+@pytest.mark.parametrize(("landed", "word"), [(True, "stands"), (False, "falls")])
+def test_verdict_where_the_constraint_decides_nothing(landed, word):
+    sentence = verdict(JumpConfig(), episode(landed=landed), episode(landed=landed))
+    assert sentence == f"The robot {word} with the momentum constraint (3d) and without it."
+
+
 @pytest.mark.parametrize(("controller", "equation"), [("velocity", "3d"), ("torque", "6d")])
 @pytest.mark.parametrize(
     ("ours", "without", "words"),

@@ -46,7 +46,7 @@ def test_hindsight_wants_two_neighbours():
     assert robust(success).tolist() == [True, False, True, False]
 
 
-def test_the_law_is_a_line_within_the_range():
+def test_the_line_is_within_the_range():
     start = Start((0.05, -0.5), 0.1)
     for axis in ("forward", "pitch"):
         action = dict(zip(AXES, Line(axis, 0.2, -2.0).policy(start).action, strict=True))
@@ -77,7 +77,7 @@ def test_pushes_begin_within_the_launch():
 def small(monkeypatch):
     """A measurement of few actions, in a world."""
     monkeypatch.setattr("experiments.headroom.GRID", {"forward": (0.0, 0.1), "pitch": (0.0, 0.1)})
-    monkeypatch.setattr("experiments.headroom.LAWS", (("pitch", (0.0,), (-2.0,)),))
+    monkeypatch.setattr("experiments.headroom.LINES", (("pitch", (0.0,), (-2.0,)),))
 
     def measured(world, episodes):
         config = JumpConfig.of(randomization=world, residual_axes=AXES, early_end=True)
@@ -94,9 +94,9 @@ def told(found):
 
 def test_where_nothing_fails_nothing_is_chosen(small):
     found = small("none", 2)
-    for name in ("zero", "constant", "law", "hindsight", "after the push"):
+    for name in ("zero", "constant", "line", "hindsight", "after the push"):
         assert found[name].tolist() == [True, True]
-    assert found["chosen constant"] == found["chosen law"] == ZERO
+    assert found["chosen constant"] == found["chosen line"] == ZERO
     assert told(found).split().count("zero") == 3
 
 
@@ -106,7 +106,7 @@ def test_elsewhere_hindsight_loses_nothing(small):
     assert not zero.all()
     for name in ("hindsight", "after the push"):
         assert (found[name] >= zero).all()
-    assert found["chosen law"] == Line("pitch", 0.0, -2.0)
+    assert found["chosen line"] == Line("pitch", 0.0, -2.0)
     assert "pitch +0 -2 lean" in told(found)
 
 

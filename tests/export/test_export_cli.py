@@ -12,10 +12,13 @@ from icub_jump_env.policy import load_policy
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["video"], "export='video' is not allowed: one of policy, plan, jump, dataset"),
+        (["video"], "export='video' is not allowed: expected one of policy, plan, jump, dataset"),
         (["policy", "velocity"], "missing: PATH"),
         (["policy", "velocity", "x.onnx", "--fast"], "Unrecognized options: --fast"),
-        (["policy", "velocity", "x.json"], "file='x.json' is not allowed: a file whose name ends"),
+        (
+            ["policy", "velocity", "x.json"],
+            "file='x.json' is not allowed: expected a file whose name ends",
+        ),
         (["jump", "--seed", "3"], "missing: PATH"),
         (["jump", "x.csv", "--compare", "a", "b"], "Unrecognized options: --compare"),
         (["dataset", "bad name", "--episodes", "2"], "dataset='bad name' is not allowed"),

@@ -34,11 +34,6 @@ RETRIES = 5
 _PATIENCE = 10.0
 """How long (s) the head may take to accept a connection; Ray itself would try for minutes."""
 
-_REMEDY = (
-    "a cluster needs the extra 'cluster', in the repository's folder: "
-    'pip install -c constraints.txt -e ".[cluster]"'
-)
-
 
 class ClusterError(ICubJumpError, RuntimeError):
     """There is no cluster at an address, it cannot be joined, or has no processors."""
@@ -82,7 +77,7 @@ class Cluster:
         try:
             import ray
         except ImportError as error:
-            raise MissingDependencyError(_REMEDY) from error
+            raise MissingDependencyError.of_extra("a cluster", "cluster") from error
         if ray.is_initialized():
             return
         host, _, port = self.address.rpartition(":")

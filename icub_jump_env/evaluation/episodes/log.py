@@ -36,8 +36,8 @@ class EpisodeLog:
         Args:
             path: The file; its folder is made if missing.
             header: What was asked for; decides whether a log can be resumed.
-            resume: Go on with an existing log. Else an existing one is kept beside the
-                new one, under a name with a number.
+            resume: Go on with an existing log, if there is one. Else an existing one is kept
+                beside the new one, under a name with a number.
 
         Raises:
             ConfigError: If the existing log answers another question.
@@ -47,8 +47,6 @@ class EpisodeLog:
         self._header = _sealed(header)
         self.kept: Path | None = None
         self.damaged = 0
-        if resume and not path.exists():
-            raise ConfigError("resume", str(path), "a log that exists")
         if path.exists():
             old_header, lines = self._read()
             if resume:

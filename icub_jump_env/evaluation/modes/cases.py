@@ -34,7 +34,7 @@ def constraints() -> list[Case]:
     """Task and momentum as weighted costs, and as constraints, as the paper prints them."""
     return [
         Case(
-            f"{100 * height:g} cm, {world}",
+            f"{100 * height:g} cm, {world} world",
             form,
             {"jump_height": height, "constraints": form, "randomization": randomization},
         )

@@ -84,8 +84,7 @@ def run_contenders(
     for contender in contenders:
         series = Series(options.config, options.seeds, contender)
         log = series.default_log()
-        resume = options.resume and log.exists()
-        arms[contender.name] = series.run(log, resume, options.workers, progress)
+        arms[contender.name] = series.run(log, options.resume, options.workers, progress)
     return arms
 
 

@@ -28,7 +28,7 @@ REPETITIONS = 10
 
 @dataclass(frozen=True)
 class Highest:
-    """The highest jump that stands.
+    """The highest plan with which the robot stands.
 
     Attributes:
         family: The plans.
@@ -104,7 +104,7 @@ def _most_collisions(episodes: Sequence[Episode]) -> float:
 
 def render(found: Mapping[ControllerName, Highest]) -> Table:
     """A column for each controller."""
-    table = new_table(1, "", *found, title="The highest jump")
+    table = new_table(1, "", *found, title="The highest plan that stands")
     families = [best.family for best in found.values()]
     summaries = [best.summary for best in found.values()]
     plans = [family.card["plans"][-1] for family in families]
@@ -118,7 +118,7 @@ def render(found: Mapping[ControllerName, Highest]) -> Table:
     for name, cells in (
         ("physical optimum, cm", (number(family.optimum, "cm") for family in families)),
         ("highest plan, cm", (number(plan["height"], "cm") for plan in plans)),
-        ("highest jump that stands, cm", medians("flight_height", "cm")),
+        ("rise with the highest that stands, cm", medians("flight_height", "cm")),
         ("  10 to 90 %", (spread(low, high, "cm") for low, _, high in rises)),
         ("  of the physical optimum, %", (number(share, "%") for share in shares)),
         ("sole height, cm", medians("sole_height", "cm")),

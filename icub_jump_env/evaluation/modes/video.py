@@ -23,8 +23,6 @@ AFTER_LANDING = 0.6
 
 FORMATS = (".mp4", ".gif")
 
-_REMEDY = "writing video needs the extra 'video': pip install imageio imageio-ffmpeg"
-
 
 def check_video(file: Path) -> None:
     """Refuse early if a video cannot be recorded here.
@@ -39,7 +37,7 @@ def check_video(file: Path) -> None:
         import imageio.v3  # noqa: F401 (only to see whether it is there)
         import imageio_ffmpeg  # noqa: F401
     except ImportError as error:
-        raise MissingDependencyError(_REMEDY) from error
+        raise MissingDependencyError.of_extra("writing video", "video") from error
     open_context(1, 1).free()
 
 

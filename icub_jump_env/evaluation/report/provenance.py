@@ -102,4 +102,8 @@ def versions(*more: str) -> dict[str, str]:
 
 def command() -> list[str]:
     """The command that runs."""
-    return ["python", *sys.argv]
+    program, *words = sys.argv
+    return [
+        *(program.split() if program.startswith("icub-jump ") else ("python", program)),
+        *words,
+    ]

@@ -112,6 +112,8 @@ def verdict(config: JumpConfig, ours: Episode, other: Episode) -> str:
     arms = (ours, other) if config.controller_config.momentum_control else (other, ours)
     with_, without = ("stands" if arm.jump["landed"] else "falls" for arm in arms)
     constraint = f"momentum constraint ({MOMENTUM_EQUATION[config.controller_name]})"
+    if with_ == without:
+        return f"The robot {with_} with the {constraint} and without it."
     return f"With the {constraint} the robot {with_}; without it, it {without}."
 
 
