@@ -15,7 +15,7 @@ if __name__ == "__main__":
     algorithm = (
         PPOConfig()
         .environment("icub_jump_env:ICubJump-v1", env_config=TASK)  # each process imports it
-        .env_runners(num_env_runners=1)
+        .env_runners(num_env_runners=1, sample_timeout_s=600.0)  # the first jump compiles
         .training(train_batch_size=1024, minibatch_size=256, num_epochs=10)
         .training(lr=5e-4, gamma=0.999, lambda_=0.98)
         .rl_module(model_config=network)

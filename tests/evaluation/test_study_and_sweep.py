@@ -136,7 +136,7 @@ class TestAllStudies:
     )
     def test_the_task_is_posed_hard_and_soft(self, asked, height, world, randomization):
         found, table = posed("constraints", asked)
-        group = f"{height} cm, {world}"
+        group = f"{height} cm, {world} world"
         assert group in table
         forms = [
             (label.label, controller, config)

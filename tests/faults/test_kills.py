@@ -69,7 +69,7 @@ def test_an_evaluation_killed_at_any_time_is_finished(often, rng, whole, tmp_pat
     for _ in often(100):
         parts.unlink(missing_ok=True)
         kill(rng.uniform(0.0, whole.duration), *EVALUATION, parts)
-        assert run(*EVALUATION, parts, *(["--resume"] if parts.exists() else []))[0] == 0
+        assert run(*EVALUATION, parts, "--resume")[0] == 0
         assert parts.read_bytes() == whole.content
 
 
@@ -87,7 +87,7 @@ def test_an_evaluation_whose_worker_is_killed_is_finished(often, rng, whole, tmp
         assert process.returncode in (0, 2)
         assert process.returncode == 0 or "died (exit code -9)" in said.splitlines()[-1]
         if process.returncode:
-            assert run(*EVALUATION, parts, *(["--resume"] if parts.exists() else []))[0] == 0
+            assert run(*EVALUATION, parts, "--resume")[0] == 0
         assert parts.read_bytes() == whole.content
 
 
@@ -129,7 +129,7 @@ def test_a_full_disk_is_told_and_the_evaluation_finished(often, rng, tmp_path):
             assert code == 2
             assert said.splitlines()[-1].startswith("error: [Errno 28] No space left on device")
             subprocess.run(["mount", "-o", "remount,size=1m", disk], check=True)
-            assert run(*EVALUATION, parts, *(["--resume"] if parts.exists() else []))[0] == 0
+            assert run(*EVALUATION, parts, "--resume")[0] == 0
             assert parts.read_bytes() == whole.read_bytes()
     finally:
         subprocess.run(["umount", disk], check=True)
