@@ -15,12 +15,14 @@ from icub_jump_env.control.qp.solvers import CheckedSolver
 
 SOLVABLE = ("plain", "scaled", "flat", "degenerate")
 BROKEN = ("contradictory", "outside", "poisoned")
+SIZES = ((4, 1, 1), (9, 11, 2), (16, 5, 5), (29, 8, 3))
+"""Variables, inequalities and equalities; few, as the solver is compiled for each."""
 
 
 def drawn(kind, rng):
     """A program of a size like the controllers', whole or broken in some way."""
-    n, inequalities, equalities = rng.integers(4, 30), rng.integers(1, 12), rng.integers(1, 6)
-    problem = QuadraticProgram(n, inequalities, min(equalities, n - 2))
+    n, inequalities, equalities = rng.choice(SIZES)
+    problem = QuadraticProgram(n, inequalities, equalities)
     root = rng.normal(size=(n, n))
     problem.H[:] = root @ root.T + 0.1 * np.eye(n)
     problem.g[:] = 10.0 * rng.normal(size=n)
