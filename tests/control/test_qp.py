@@ -116,6 +116,15 @@ def poisoned(field, value):
     return problem
 
 
+@pytest.mark.parametrize("name", sorted(SOLVERS))
+def test_what_is_refused_at_once_takes_no_iteration(name):
+    problem = random_problem(3)
+    problem.lower[0] = problem.upper[0] + 1.0
+    solution = make_solver(name, problem).solve()
+    assert solution.status is not QPStatus.SOLVED
+    assert (solution.iterations, *solution.x) == (0,) * (1 + problem.n)
+
+
 @pytest.mark.parametrize("built_before", [True, False])
 @pytest.mark.parametrize(
     ("field", "value"),
