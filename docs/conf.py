@@ -69,10 +69,19 @@ def after_napoleon(
     lines.extend(_whole.pop(name, []))
 
 
+def drop_sourceless(app: Sphinx) -> list[Any]:
+    """Modules without a source have no page, but Sphinx would link to one."""
+    modules = app.env._viewcode_modules  # type: ignore[attr-defined]
+    for name in [name for name, entry in modules.items() if not entry]:
+        del modules[name]
+    return []  # no page of our own
+
+
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.connect("autodoc-process-docstring", before_napoleon, priority=400)
     app.connect("autodoc-process-docstring", after_napoleon, priority=600)
+    app.connect("html-collect-pages", drop_sourceless, priority=400)
     app.add_html_math_renderer(
         "mathml", inline_renderers=(inline, None), block_renderers=(block, None)
     )

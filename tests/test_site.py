@@ -43,6 +43,13 @@ def test_a_page_loads_nothing_from_elsewhere(site):
         assert not [address for address in loaded if "//" in address], page
 
 
+def test_links_within_the_site_lead_somewhere(site):
+    for page in site.rglob("*.html"):
+        for link in re.findall(r'(?:href|src)="([^"#?]+)', page.read_text()):
+            if ":" not in link:
+                assert (page.parent / link).exists(), (page, link)
+
+
 def test_equations_are_shown(site):
     page = (site / "theory.html").read_text()
     assert page.count('<math xmlns="http://www.w3.org/1998/Math/MathML" display="block">') > 10
