@@ -71,7 +71,7 @@ def after_napoleon(
 
 def drop_sourceless(app: Sphinx) -> list[Any]:
     """Modules without a source have no page, but Sphinx would link to one."""
-    modules = app.env._viewcode_modules  # type: ignore[attr-defined]
+    modules = app.env._viewcode_modules
     for name in [name for name, entry in modules.items() if not entry]:
         del modules[name]
     return []  # no page of our own

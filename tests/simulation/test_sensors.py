@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from icub_jump_env.errors import ConfigError
+from icub_jump_env.estimation.readings import LOADED
 from icub_jump_env.robot.robot import load_robot
 from icub_jump_env.simulation.physics import Physics
 from icub_jump_env.simulation.randomization import Randomization, draw_world
@@ -19,7 +20,7 @@ from icub_jump_env.simulation.sensor_models import (
     SensorConfig,
     SensorError,
 )
-from icub_jump_env.simulation.sensors import Sensors
+from icub_jump_env.simulation.sensors import Sensors, falsify_cop, find_cop
 
 ROBOT = load_robot()
 
@@ -265,3 +266,27 @@ def test_bad_configurations_are_refused(values):
     assert refusal.value.field in values
     with pytest.raises(ConfigError, match="noise"):
         SensorError(noise=-1.0)
+
+
+@pytest.mark.parametrize("force", [LOADED - 0.1, LOADED + 0.1, 90.0])
+def test_a_loaded_sole_has_a_centre_of_pressure(force):
+    """Where the force acts, in the sole's axes, as moments say that are a little wrong."""
+    assert LOADED == 5.0  # N, of which the pages speak
+    rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    position, forward, left = np.array([1.0, 2.0, 0.0]), 0.03, -0.02
+    where = position + rotation @ (forward, left, 0.0)
+    cop = np.full(2, np.nan)
+    find_cop(np.array([1.0, 0.0, 0.0, force, *where]), position, rotation, cop)
+    loaded = force > LOADED
+    np.testing.assert_allclose(cop, np.array([forward, left]) * loaded, atol=1e-15)
+    roll, pitch, told = 0.4, -0.3, 1.1 * force
+    falsify_cop(force, told, roll, pitch, cop)
+    moved = np.array([forward * force - pitch, left * force + roll]) / told
+    np.testing.assert_allclose(cop, moved * loaded)
+
+
+@pytest.mark.parametrize(("force", "told"), [(LOADED + 1.0, LOADED), (LOADED, LOADED + 1.0)])
+def test_a_sole_that_hardly_seems_loaded_has_none(force, told):
+    cop = np.array([0.03, -0.02])
+    falsify_cop(force, told, 0.4, -0.3, cop)
+    assert cop.tolist() == [0.0, 0.0]
