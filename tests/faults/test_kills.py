@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import psutil
 import pytest
 from tiny_run import ARGUMENTS, results
@@ -20,8 +21,13 @@ EVALUATION = (
 
 @pytest.fixture
 def often(only_full, many):
-    """How often: a program takes seconds."""
-    return lambda count: range(many(0, count))
+    """How often in one test: a program takes seconds."""
+    return range(many(0, 10))
+
+
+def times_ten(count):
+    """So many tests, each with other random times."""
+    return pytest.mark.parametrize("rng", [np.random.default_rng(seed) for seed in range(count)])
 
 
 def start(*words, cwd=None):
@@ -64,9 +70,10 @@ def whole(only_full, tmp_path):
 
 
 @pytest.mark.fault("killed evaluations")
+@times_ten(10)
 def test_an_evaluation_killed_at_any_time_is_finished(often, rng, whole, tmp_path):
     parts = tmp_path / "parts.jsonl"
-    for _ in often(100):
+    for _ in often:
         parts.unlink(missing_ok=True)
         kill(rng.uniform(0.0, whole.duration), *EVALUATION, parts)
         assert run(*EVALUATION, parts, "--resume")[0] == 0
@@ -74,9 +81,10 @@ def test_an_evaluation_killed_at_any_time_is_finished(often, rng, whole, tmp_pat
 
 
 @pytest.mark.fault("killed workers")
+@times_ten(5)
 def test_an_evaluation_whose_worker_is_killed_is_finished(often, rng, whole, tmp_path):
     parts = tmp_path / "parts.jsonl"
-    for _ in often(50):
+    for _ in often:
         parts.unlink(missing_ok=True)
         with start(REPOSITORY / "eval.py", *EVALUATION[1:], parts) as process:
             time.sleep(rng.uniform(0.0, whole.duration))
@@ -92,6 +100,7 @@ def test_an_evaluation_whose_worker_is_killed_is_finished(often, rng, whole, tmp
 
 
 @pytest.mark.fault("killed trainings")
+@times_ten(5)
 def test_a_training_killed_at_any_time_is_finished(often, rng, tmp_path):
     pytest.importorskip("torch")
     whole, words = tmp_path / "whole", ("train.py", "--run", "run", *ARGUMENTS)
@@ -99,7 +108,7 @@ def test_a_training_killed_at_any_time_is_finished(often, rng, tmp_path):
     begun = time.monotonic()
     assert run(*words, cwd=whole)[0] == 0
     duration = time.monotonic() - begun
-    for number in often(50):
+    for number in often:
         folder = tmp_path / str(number)
         folder.mkdir()
         kill(rng.uniform(0.0, duration), *words, cwd=folder)
@@ -120,7 +129,7 @@ def test_a_full_disk_is_told_and_the_evaluation_finished(often, rng, tmp_path):
         pytest.skip("no disk can be mounted here")
     try:
         assert run(*EVALUATION, whole)[0] == 0
-        for _ in often(10):
+        for _ in often:
             parts = disk / "parts.jsonl"
             parts.unlink(missing_ok=True)
             pages = rng.integers(1, 4)
