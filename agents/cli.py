@@ -12,6 +12,7 @@ from rich.console import Console
 from icub_jump_env.errors import ConfigError, MissingDependencyError
 from icub_jump_env.evaluation.cli import guarded, parse, seek
 from icub_jump_env.evaluation.report.output import say
+from icub_jump_env.evaluation.report.provenance import command
 from icub_jump_env.workers import WorkerError
 
 from .options import OPTIONS, TrainOptions, read_options
@@ -46,8 +47,8 @@ def _run(arguments: Sequence[str]) -> None:
         if several:
             say(console, "the same command goes on")
         elif (options.folder / OPTIONS).exists():
-            folder = shlex.quote(str(options.folder))
-            say(console, f"go on with: python train.py --resume {folder}")
+            words = [*command()[:2], "--resume", str(options.folder)]
+            say(console, f"go on with: {shlex.join(words)}")
         raise
 
 

@@ -102,7 +102,7 @@ def test_every_error_is_clean_and_stays_so_in_another_process(error):
 
 def test_results_nested_too_deep_are_refused():
     with pytest.raises(
-        ConfigError, match=r"^results=\[.* is not allowed: expected nested at most 32 deep$"
+        ConfigError, match=r"^results=\[.* is not allowed: expected values nested at most 32 deep$"
     ):
         check_results("results", nested(100_000))
 

@@ -2,8 +2,8 @@
 
     python tests/test_recorded.py        # record anew
 
-Other processors round otherwise. The last digit of a state grows by a factor of 200 at most in these
-jumps, so that the tolerance leaves room for that and for nothing else.
+Other processors round otherwise. A small error grows by a factor of 200 at most in these jumps, so that
+rounding stays far below the tolerance.
 """
 
 import json
@@ -25,7 +25,7 @@ JUMPS = {
     for world, options in WORLDS.items()
 }
 STEPS = (20, 40, 60, 100, 200)
-"""Of 10 ms: two in the launch, one in flight, two after it."""
+"""Of 10 ms: in the launch, around the flight, and after it."""
 TOLERANCE = 1e-8
 
 

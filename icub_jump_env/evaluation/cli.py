@@ -212,7 +212,7 @@ def _one_line(complaint: str) -> str:
         message.append(line)
     # tyro says so where a dataclass itself refused; the user knows no dataclass.
     text = re.sub(r"^Error parsing \w*Options: ", "", " ".join(message)) or "bad arguments"
-    text = re.sub(r"^Missing from \S+: ", "missing: ", text)
+    text = re.sub(r"^Missing from [^:]+: ", "missing: ", text)
     if text.startswith("Unrecognized options"):
         # Sorted: tyro has them in any order.
         similar = sorted(set(re.findall(r"^│ {5}(--[\w.-]+)", complaint, re.MULTILINE)))

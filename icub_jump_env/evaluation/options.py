@@ -81,7 +81,7 @@ class EvalOptions:
             constraint, what ends the launch, the robot; how flight and landing are controlled,
             under disturbances of several sizes.
         sweep: Desired height against displacement, for both controllers.
-        max_height: The highest whole-body plan and the rise with the highest that stands, for both
+        max_height: The highest whole-body plan, and the rise with the highest that stands, for both
             controllers, with what binds.
         report: Write one self-contained HTML page into this folder (extra 'video').
         view: Show the jump live, in the browser or in a window.

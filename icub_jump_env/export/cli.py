@@ -96,6 +96,7 @@ def export(arguments: Sequence[str]) -> None:
 def _export(kind: str, words: Sequence[str]) -> None:
     if kind not in _WRITERS:
         raise InvalidValueError("export", kind, f"one of {', '.join(_WRITERS)}")
+    sys.argv = [f"{sys.argv[0]} {kind}", *words]  # what the help says
     print(f"wrote {_WRITERS[kind](words)}", file=sys.stderr)
 
 

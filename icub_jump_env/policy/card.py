@@ -148,7 +148,7 @@ class PolicyCard:
         check_count("format", values.get("format"), FORMAT, FORMAT)
         names = {field.name for field in dataclasses.fields(cls)}
         for name in sorted(names ^ values.keys()):
-            state = "a field that is missing" if name in names else "no such field"
+            state = "not left out" if name in names else "no such field"
             allowed = f"{state}; the fields are {', '.join(sorted(names))}"
             raise ConfigError(name, values.get(name), allowed)
         return cls(**values)

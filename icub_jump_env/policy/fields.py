@@ -113,7 +113,7 @@ def check_command(words: Any) -> tuple[str, ...]:
 def check_results(field: str, value: Any) -> Any:
     """Refuse anything but numbers, None, and lists and mappings of them."""
     if deeper(value, MAX_DEPTH):
-        raise ConfigError(field, value, f"nested at most {MAX_DEPTH} deep")
+        raise ConfigError(field, value, f"values nested at most {MAX_DEPTH} deep")
     return _check_results(field, value)
 
 

@@ -159,5 +159,5 @@ def _make(card: PolicyCard, tensors: Mapping[str, NDArray[Any]]) -> SavedPolicy:
 
 def _check_names(tensors: Mapping[str, Any], expected: list[str]) -> None:
     for name in sorted(tensors.keys() ^ set(expected)):
-        state = "an array that is missing" if name in expected else "no array of this policy"
+        state = "not left out" if name in expected else "no array of this policy"
         raise ConfigError("tensors", name, f"{state}; they are {', '.join(expected)}")

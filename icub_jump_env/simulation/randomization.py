@@ -168,7 +168,7 @@ class Randomization:
             raise ConfigError("delay", self.delay, "whole numbers of control ticks")
         lies_at, most = self.step[1], HIGHEST_BLOCK - self.step[1]
         if max(abs(bound) for bound in self.edge) > most:
-            expected = f"within +/- {most:g} m on a step of {lies_at:g} m"
+            expected = f"bounds within +/- {most:g} m on a step of {lies_at:g} m"
             raise ConfigError("edge", self.edge, expected)
 
     @property

@@ -38,7 +38,7 @@ def test_the_command_prints_both_controllers(twice, tmp_path):
         env = make_env(perturbed(config.replace(jump_height=family.highest)))
         rises = [run_episode(env, seed).jump["flight_height"] for seed in (3, 4)]
         rise = f"{50 * sum(rises):.2f}"
-        (row,) = [line for line in out.splitlines() if "highest that stands, cm" in line]
+        (row,) = [line for line in out.splitlines() if "plan that stands, cm" in line]
         assert row.split()[-2 + place] == rise
         (row,) = [line for line in out.splitlines() if "of the physical optimum" in line]
         share = 50 * sum(rises) / family.optimum

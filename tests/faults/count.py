@@ -9,6 +9,7 @@ import contextlib
 import functools
 import io
 import json
+import subprocess
 import sys
 from collections import Counter, defaultdict
 from pathlib import Path
@@ -18,24 +19,43 @@ from rich.console import Console
 
 from icub_jump_env.evaluation.report.output import new_table, show
 
+REPOSITORY = Path(__file__).parents[2]
+
+
+def code():
+    """What is tried: the trees of the commit."""
+    words = (
+        "git",
+        "rev-parse",
+        *(f"HEAD:{name}" for name in ("icub_jump_env", "agents", "tests")),
+    )
+    found = subprocess.run(words, cwd=REPOSITORY, check=True, capture_output=True, text=True)
+    return found.stdout.split()
+
 
 class Count:
     """Counts the cases of each test, and writes a line for each that ends.
 
     Attributes:
-        ended: What was told of each test, by its name.
+        entries: The lines, of this code alone.
     """
 
     def __init__(self, file):
-        self._file, self._cases = file, Counter()
-        lines = file.read_text().splitlines() if file.exists() else []
-        entries = map(json.loads, lines)
-        self.ended = {entry["test"]: entry for entry in entries if not entry["failed"]}
+        self._file, self._code, self._cases = file, code(), Counter()
+        self.entries = []
+        for line in file.read_text().splitlines() if file.exists() else []:
+            with contextlib.suppress(ValueError):  # half a line
+                entry = json.loads(line)
+                if entry["code"] == self._code:
+                    self.entries.append(entry)
+        lines = (json.dumps(entry) + "\n" for entry in self.entries)
+        file.write_text("".join(lines))
 
     def pytest_collection_modifyitems(self, items):
         from hypothesis import is_hypothesis_test  # pytest wants to be first
 
-        items[:] = [item for item in items if item.nodeid not in self.ended]
+        done = {e["test"] for e in self.entries if not e["failed"] and not e["skipped"]}
+        items[:] = [item for item in items if item.nodeid not in done]
         # A test with parameters is several items.
         for function in {item.function for item in items if is_hypothesis_test(item.obj)}:
             handle = function.hypothesis
@@ -54,7 +74,7 @@ class Count:
     def pytest_runtest_protocol(self, item):
         self._present = {
             "test": item.nodeid, "fault": item.get_closest_marker("fault").args[0],
-            "cases": 0, "failed": False, "skipped": False,
+            "cases": 0, "failed": False, "skipped": False, "code": self._code,
         }  # fmt: skip
 
     @pytest.hookimpl(wrapper=True)
@@ -68,21 +88,24 @@ class Count:
         present["failed"] |= report.failed
         present["skipped"] |= report.skipped
         if report.when == "teardown":
-            self.ended[item.nodeid] = present
+            self.entries.append(present)
             with self._file.open("a") as file:
                 print(json.dumps(present), file=file)
         return report
 
 
-def table_of(ended):
-    """A line for each fault."""
-    by_fault = defaultdict(list)
-    for entry in ended:
-        by_fault[entry["fault"]].append(entry)
+def table_of(entries):
+    """A line for each fault. A test that failed once has failed, whatever came of it later."""
+    by_fault = defaultdict(dict)
+    failed = {entry["test"] for entry in entries if entry["failed"]}
+    for entry in entries:
+        by_fault[entry["fault"]][entry["test"]] = entry
     table = new_table(1, "fault", "tests", "cases", "failed", "skipped")
-    for fault, entries in sorted(by_fault.items()):
-        sums = [sum(e[name] for e in entries) for name in ("cases", "failed", "skipped")]
-        table.add_row(fault, *(f"{n:,}" for n in (len(entries) - sums[-1], *sums)))
+    for fault, last in sorted(by_fault.items()):
+        cases = sum(entry["cases"] for entry in last.values())
+        skipped = sum(entry["skipped"] for entry in last.values())
+        numbers = (len(last) - skipped, cases, len(failed & last.keys()), skipped)
+        table.add_row(fault, *(f"{number:,}" for number in numbers))
     return table
 
 
@@ -98,11 +121,13 @@ def main():
     elif file.exists():
         print(f"going on with {file}; without it, all is tried again", file=sys.stderr)
     count, printed = Count(file), io.StringIO()
-    words = [str(Path(__file__).parents[1]), "-m", "fault", "-q", *([] if quick else ["--full"])]
+    words = [str(REPOSITORY / "tests"), "-m", "fault", "-q", *([] if quick else ["--full"])]
     with contextlib.redirect_stdout(printed):
-        code = pytest.main(words, plugins=[count])
-    show(Console(), table_of(count.ended.values()))
-    if code not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+        ended = pytest.main(words, plugins=[count])
+    show(Console(), table_of(count.entries))
+    if ended != pytest.ExitCode.OK and not (
+        count.entries and ended == pytest.ExitCode.NO_TESTS_COLLECTED
+    ):
         print(printed.getvalue(), file=sys.stderr)
         sys.exit(1)
 

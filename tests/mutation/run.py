@@ -103,22 +103,23 @@ def passes(tests: Sequence[str], copy: Path) -> bool:
     """Whether all of these tests pass in a copy of the repository."""
     words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
     paths = {"PYTHONPATH": str(copy), "NUMBA_CACHE_DIR": str(copy / "compiled")}
+    checked = {"NUMBA_BOUNDSCHECK": "1"}  # what is written beside an array would go unnoticed
     try:
         ran = subprocess.run(
-            words, cwd=copy, env=os.environ | paths, timeout=LONGEST, capture_output=True
+            words, cwd=copy, env=os.environ | paths | checked, timeout=LONGEST, capture_output=True
         )
     except subprocess.TimeoutExpired:
         return False
     return ran.returncode == 0
 
 
-def tests_of(mutant: Mutant) -> list[str]:
+def tests_of(mutant: Mutant, copy: Path) -> list[str]:
     """Files of tests of a mutant's package; first those that name its module, the shorter before."""
     name = ".".join(Path(mutant.module).with_suffix("").parts)
-    files = sorted((REPOSITORY / "tests" / mutant.package).glob("test_*.py"))
+    files = sorted((copy / "tests" / mutant.package).glob("test_*.py"))
     code = {file: file.read_text() for file in files}
     files.sort(key=lambda file: (name not in code[file], len(code[file])))
-    return [str(file.relative_to(REPOSITORY)) for file in files]
+    return [str(file.relative_to(copy)) for file in files]
 
 
 def is_noticed(mutant: Mutant, copy: Path) -> bool:
@@ -127,7 +128,7 @@ def is_noticed(mutant: Mutant, copy: Path) -> bool:
     code = file.read_text()
     file.write_text(mutated(mutant.module, mutant.operator, mutant.occurrence))
     try:
-        return not (passes(tests_of(mutant), copy) and passes(OTHERS, copy))
+        return not (passes(tests_of(mutant, copy), copy) and passes(OTHERS, copy))
     finally:
         file.write_text(code)
 

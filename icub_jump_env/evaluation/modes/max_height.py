@@ -118,7 +118,7 @@ def render(found: Mapping[ControllerName, Highest]) -> Table:
     for name, cells in (
         ("physical optimum, cm", (number(family.optimum, "cm") for family in families)),
         ("highest plan, cm", (number(plan["height"], "cm") for plan in plans)),
-        ("rise with the highest that stands, cm", medians("flight_height", "cm")),
+        ("rise with the highest plan that stands, cm", medians("flight_height", "cm")),
         ("  10 to 90 %", (spread(low, high, "cm") for low, _, high in rises)),
         ("  of the physical optimum, %", (number(share, "%") for share in shares)),
         ("sole height, cm", medians("sole_height", "cm")),
