@@ -385,9 +385,7 @@ class JumpConfig(WithShortcuts):
                     dataclasses.replace(self, jump_height=height)  # refuses what has no plan
                 return self, heights
             if name != "jump_height":
-                raise ConfigError(
-                    f"options[{name!r}]", value, f"no such option; the options are {allowed}"
-                )
+                raise ConfigError(f"options[{name!r}]", value, f"no such option; say {allowed}")
         return dataclasses.replace(self, **options), None
 
 
