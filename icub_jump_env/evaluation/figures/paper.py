@@ -183,10 +183,10 @@ def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool =
 
 
 def _add_legend(figure: Figure, estimated: bool = False) -> None:
-    styles = [("desired", DESIRED, "--"), ("limit; T: take-off", ACCENT, ":")]
-    styles.insert(0, ("estimated" if estimated else "measured", MEASURED, "-"))
+    styles = [("estimated" if estimated else "measured", MEASURED, "-")]
     if estimated:
-        styles.insert(1, ("true", ACCENT, "-"))
+        styles.append(("true", ACCENT, "-"))
+    styles += [("desired", DESIRED, "--"), ("limit; T: take-off", ACCENT, ":")]
     handles = [Line2D([], [], color=color, ls=ls, label=label) for label, color, ls in styles]
     figure.legend(
         handles=handles, frameon=False, loc="outside lower center",

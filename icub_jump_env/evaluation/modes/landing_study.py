@@ -160,7 +160,7 @@ def compare(
         for case in cases[name]
         for variant in variants
     ]
-    logs = [each.open_log(path, resume) for each in series for path in (each.default_log(),)]
+    logs = [each.open_log(each.default_log(), resume) for each in series]
     done = iter(fill(list(zip(series, logs, strict=True)), jobs, progress))
     results = {
         name: [
