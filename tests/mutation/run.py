@@ -1,11 +1,13 @@
 """How many random changes of the code the tests notice.
 
     pip install cosmic-ray
-    python tests/mutation/run.py --jobs 2        # hours; an interrupted run goes on
+    python tests/mutation/run.py --jobs 2        # an interrupted run goes on
 
 Cosmic Ray makes all mutants of the packages that decide what is measured and commanded: another
 operator, comparison or number, a condition turned round, a line less. A random sample of them is tried.
-The tests of a mutant's own package come first, the others if those notice nothing.
+The tests of a mutant's own package come first, the others if those notice nothing. What came of each
+is kept in ``tried.jsonl``: without this file, all are tried again; with it, those that are new, and
+those that no test noticed, as there may be one by now.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import random
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -43,6 +45,7 @@ LONGEST = 900.0
 ARITHMETIC = {"Add", "Sub", "Mul", "Div"}
 """Operators that replace one another; of numbers the others fail at once, or stand in annotations."""
 EXPLAINED = Path(__file__).with_name("explained.toml")
+TRIED = Path(__file__).with_name("tried.jsonl")
 
 
 class Mutant(NamedTuple):
@@ -62,6 +65,11 @@ class Mutant(NamedTuple):
     occurrence: int
     before: str
     after: str
+
+    @property
+    def change(self) -> tuple[str, str, str]:
+        """Module, line and changed line."""
+        return self.module, self.before, self.after
 
 
 def all_of(package: str) -> Iterator[tuple[str, str, int]]:
@@ -145,20 +153,24 @@ def copies(folder: Path, count: int) -> queue.SimpleQueue[Path]:
 
 def explained() -> dict[tuple[str, str, str], str]:
     """Why a mutant that no test notices is none: by module, line and changed line."""
-    entries = tomllib.loads(EXPLAINED.read_text())["mutant"] if EXPLAINED.exists() else []
+    entries = tomllib.loads(EXPLAINED.read_text())["mutant"]
     return {(e["module"], e["before"], e["after"]): e["why"] for e in entries}
 
 
-def try_all(mutants: Iterable[Mutant], results: Path, jobs: int) -> dict[Mutant, bool]:
-    """Whether each mutant is noticed; those in ``results`` are not tried again."""
-    noticed: dict[Mutant, bool] = {}
-    if results.exists():
-        for line in results.read_text().splitlines():
-            *mutant, was_noticed = json.loads(line)
-            noticed[Mutant(*mutant)] = was_noticed
+def tried() -> dict[Mutant, bool]:
+    """Whether each mutant that was ever tried was noticed the last time."""
+    noticed = {}
+    for line in TRIED.read_text().splitlines() if TRIED.exists() else []:
+        *mutant, was_noticed = json.loads(line)
+        noticed[Mutant(*mutant)] = was_noticed
+    return noticed
+
+
+def try_all(mutants: Sequence[Mutant], jobs: int) -> None:
+    """Try mutants, and keep what comes of each."""
     with (
         TemporaryDirectory() as folder,
-        results.open("a") as file,
+        TRIED.open("a") as file,
         ThreadPoolExecutor(jobs) as pool,
     ):
         free = copies(Path(folder), jobs)
@@ -167,18 +179,15 @@ def try_all(mutants: Iterable[Mutant], results: Path, jobs: int) -> dict[Mutant,
             sys.exit("error: tests fail without any mutant")
         free.put(copy)
 
-        def attempt(mutant: Mutant) -> tuple[Mutant, bool]:
+        def attempt(mutant: Mutant) -> bool:
             copy = free.get()
             try:
-                return mutant, is_noticed(mutant, copy)
+                return is_noticed(mutant, copy)
             finally:
                 free.put(copy)
 
-        todo = [mutant for mutant in mutants if mutant not in noticed]
-        for mutant, was_noticed in pool.map(attempt, todo):
-            noticed[mutant] = was_noticed
+        for mutant, was_noticed in zip(mutants, pool.map(attempt, mutants), strict=True):
             print(json.dumps([*mutant, was_noticed]), file=file, flush=True)
-    return noticed
 
 
 def main() -> None:
@@ -188,27 +197,30 @@ def main() -> None:
     parser.add_argument(
         "--jobs", type=int, default=1, help="copies of the repository side by side"
     )
-    parser.add_argument("--results", type=Path, default=Path("mutants.jsonl"), help="kept here")
     options = parser.parse_args()
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     samples = {package: drawn(package, options.mutants) for package in PACKAGES}
     everything = [mutant for sample in samples.values() for mutant in sample]
-    noticed, why = try_all(everything, options.results, options.jobs), explained()
+    why, before = explained(), tried()
+    known = [m for m in before if before[m] or m.change in why]
+    if todo := [m for m in everything if m not in known]:
+        try_all(todo, options.jobs)
+    noticed = tried()
     table = new_table(
         1, "package", "mutants", "tried", "noticed", "explained", "noticed or explained, %"
     )
     for package, sample in samples.items():
-        seen = sum(noticed[mutant] for mutant in sample)
-        known = sum((m.module, m.before, m.after) in why for m in sample if not noticed[m])
-        rate = Rate(seen + known, len(sample))
+        seen = sum(noticed[m] for m in sample)
+        equal = sum(m.change in why for m in sample if not noticed[m])
+        rate = Rate(seen + equal, len(sample))
         low, high = rate.interval
         percent = f"{100 * rate.share:.0f} ({100 * low:.0f} to {100 * high:.0f})"
         count = f"{sum(1 for _ in all_of(package)):,}"
-        table.add_row(package, count, str(len(sample)), str(seen), str(known), percent)
+        table.add_row(package, count, str(len(sample)), str(seen), str(equal), percent)
     show(Console(), table)
-    for mutant in everything:
-        if not noticed[mutant] and (mutant.module, mutant.before, mutant.after) not in why:
-            print(f"{mutant.module}\n  {mutant.before}\n  {mutant.after}")
+    for m in everything:
+        if not (noticed[m] or m.change in why):
+            print(f"{m.module}\n  {m.before}\n  {m.after}")
 
 
 if __name__ == "__main__":
