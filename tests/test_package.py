@@ -137,7 +137,7 @@ def test_wheel_ships_the_package_alone(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0].split("-")[0] for name in names} == {"icub_jump_env", "icub_jump"}
     assert "icub_jump_env/py.typed" in names
-    assert any(name.endswith("LICENSE") for name in names)
+    assert sum(name.endswith("LICENSE") for name in names) == 2  # of the code, of the pictures
     assert not [name for name in names if Path(name).suffix in (".stl", ".urdf", ".dae", ".png")]
 
 
