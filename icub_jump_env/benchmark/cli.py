@@ -54,7 +54,9 @@ def _bench(arguments: Sequence[str]) -> None:
     if arguments[:1] == ["--table"]:
         if len(arguments) == 1:
             raise InvalidValueError("table", None, "files of results")
-        show(console, leaderboard([Result.read(Path(word)) for word in arguments[1:]]))
+        results = [Result.read(Path(word)) for word in arguments[1:]]
+        for table in leaderboard(results):
+            show(console, table)
         return
     options = parse_entry(BenchOptions, arguments, file=tyro.MISSING)
     from icub_jump_env.benchmark.run import jump
@@ -86,13 +88,19 @@ def details(result: Result) -> Table:
     return table
 
 
-def leaderboard(results: Sequence[Result]) -> Table:
-    """A row for each result, the best first."""
-    table = new_table(1, "entry", "all, %", "95 %", *CASES, title="Jump benchmark: success, %")
+def leaderboard(results: Sequence[Result]) -> tuple[Table, Table]:
+    """Success and heights, a row for each result, the best first."""
+    success = new_table(1, "entry", "all, %", "95 %", *CASES, title="Jump benchmark: success, %")
+    heights = new_table(
+        1, "entry", *CASES, title="Mean rise of the CoM above take-off / above standing, cm"
+    )
     for result in sorted(results, key=lambda result: -result.total[0]):
-        shares = (f"{PERCENT * score.success.share:.0f}" for score in result.scores.values())
-        table.add_row(_literal(result.entry), *_total(result), *shares)
-    return table
+        entry, scores = _literal(result.entry), result.scores.values()
+        shares = (f"{PERCENT * score.success.share:.0f}" for score in scores)
+        success.add_row(entry, *_total(result), *shares)
+        rises = (f"{_cm(score.rise)} / {_cm(score.above_standing)}" for score in scores)
+        heights.add_row(entry, *rises)
+    return success, heights
 
 
 def _total(result: Result) -> tuple[str, str]:
@@ -106,4 +114,4 @@ def _literal(text: str) -> str:
 
 
 def _cm(height: float) -> str:
-    return "-" if math.isnan(height) else f"{CM * height:.2f}"
+    return "-" if math.isnan(height) else f"{CM * height:z.2f}"

@@ -68,7 +68,7 @@ class Result:
     Attributes:
         entry: What jumped.
         scores: By case, in the order of the table.
-        source: Versions, code, configuration and policy that it came from.
+        source: Versions, code, policy, seeds, and the configuration without what the benchmark sets.
     """
 
     entry: str

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from rich.console import Console
 
@@ -54,8 +56,18 @@ def jump(
     done = fill(logs, jobs, progress or Console(quiet=True), "the same command goes on there")
     standing = standing_height(config)
     scores = {case: Score.of(jumps, standing) for case, jumps in zip(CASES, done, strict=True)}
-    source = provenance(config, FIRST_SEED) | {"policy": contender.identity}
-    return Result(name, scores, source)
+    return Result(name, scores, _source(config, contender))
+
+
+def _source(config: JumpConfig, contender: Contender) -> dict[str, Any]:
+    """Where the result comes from; of the configuration what is the entry's own."""
+    known = provenance(config, FIRST_SEED)
+    own = {field: value for field, value in known["config"].items() if field not in FIXED}
+    return known | {
+        "config": own,
+        "policy": contender.identity,
+        "seed": [FIRST_SEED, FIRST_SEED + EPISODES * len(CASES) - 1],
+    }
 
 
 def standing_height(config: JumpConfig) -> float:

@@ -10,8 +10,9 @@ from experiments import seeds
 from icub_jump_env.benchmark.cases import CASES, EPISODES, FIRST_SEED, SUCCESS, succeeds
 from icub_jump_env.benchmark.cli import bench
 from icub_jump_env.benchmark.results import Result
-from icub_jump_env.benchmark.run import standing_height
+from icub_jump_env.benchmark.run import jump, standing_height
 from icub_jump_env.config import JumpConfig
+from icub_jump_env.evaluation.episodes.contender import Contender
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode
 from icub_jump_env.policy import load_policy
 
@@ -39,9 +40,36 @@ def test_the_result_is_what_the_episodes_say(few, tmp_path, capsys):
     assert score["success"] == {"count": sum(map(succeeds, episodes)), "total": 2}
     assert score["rise"] == np.mean([e.jump["flight_height"] for e in episodes])
     assert written["source"]["config"]["controller"] == "torque"
+    assert "randomization" not in written["source"]["config"]  # the benchmark's
+    assert written["source"]["seed"] == [FIRST_SEED, FIRST_SEED + 3]
     assert written["source"]["policy"] == {"name": "baseline", "sha256": None}
     bench(["--table", "r.json"])
-    assert "ICubJump-v0, torque, baseline" in capsys.readouterr().out
+    table = capsys.readouterr().out
+    assert table.count("ICubJump-v0, torque, baseline") == 2
+    above = score["above_standing"]
+    assert f"{100 * score['rise']:.2f} / {100 * above:.2f}" in table
+    assert above < 0.0
+
+
+class Lean:
+    """A policy of somebody's own."""
+
+    def __init__(self, forward):
+        self.forward = forward
+
+    def __call__(self, observation):
+        return np.array([self.forward, 0.0, 0.0], np.float32)
+
+
+def test_a_policy_in_python_is_an_entry_and_another_one_jumps_anew(few):
+    found = [
+        jump(JumpConfig(), "mine", Contender("lean", Lean(forward))) for forward in (0.0, 0.2, 0.2)
+    ]
+    still, moved, again = (result.scores["nominal"].rise for result in found)
+    assert still == jump(JumpConfig(), "plain").scores["nominal"].rise
+    assert still != moved == again
+    first, second, third = (result.source["policy"]["sha256"] for result in found)
+    assert first != second == third
 
 
 def test_a_policy_is_an_entry(few, tmp_path, capsys):

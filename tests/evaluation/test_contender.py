@@ -11,7 +11,8 @@ from contenders import FEEDBACK, evaluate, refusal, save, save_constant
 from rich.console import Console
 
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.evaluation.episodes.contender import read_contenders
+from icub_jump_env.errors import ConfigError
+from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
 from icub_jump_env.evaluation.episodes.log import EpisodeLog
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
 from icub_jump_env.evaluation.figures import policy as policy_figures
@@ -98,6 +99,29 @@ class TestSingleJump:
 
     def test_the_word_baseline_is_a_contender_like_no_policy(self, capsys):
         assert evaluate(capsys, "--policy", "baseline", *SHORT) == evaluate(capsys, *SHORT)
+
+
+class TestInNoFile:
+    def test_its_code_and_what_it_holds_tell_it_from_others(self):
+        assert Contender("a", own).identity == Contender("a", own).identity
+        assert Contender("a", own).identity["sha256"] is not None
+        assert Contender("a", own).identity != Contender("a", FEEDBACK).identity
+        assert Contender("a", FEEDBACK).identity != BASELINE.identity
+        assert not Contender("a", own).is_baseline
+
+    def test_what_cannot_be_told_from_others_is_refused(self):
+        def inner(observation):
+            return own(observation)
+
+        with pytest.raises(ConfigError, match=r"policy='a' is not allowed: expected .*pickled"):
+            _ = Contender("a", inner).identity
+        made = eval("lambda observation: observation[:3]")
+        with pytest.raises(ConfigError, match="a file"):
+            _ = Contender("a", made).identity
+
+
+def own(observation):
+    return np.zeros(3, np.float32)
 
 
 CARD = {

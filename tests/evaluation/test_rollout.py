@@ -81,7 +81,7 @@ def test_the_single_jump_is_the_same_with_and_without_figures():
     config = JumpConfig.of(stand_time=0.1)
     console = Console(file=io.StringIO())
     plain, drawn = (
-        run_nominal(config, 0, trace, console, Contender("feedback", FEEDBACK, card=object()))
+        run_nominal(config, 0, trace, console, Contender("feedback", FEEDBACK))
         for trace in (False, True)
     )
     for ours, theirs in zip(plain, drawn, strict=True):

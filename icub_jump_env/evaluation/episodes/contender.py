@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
+import pickle
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +13,7 @@ from pathlib import Path
 from icub_jump_env import policy
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, ICubJumpError, PolicyMismatchError, printable
+from icub_jump_env.evaluation.report.provenance import code
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import Policy, PolicyCard, check_match, load_policy
 
@@ -22,7 +25,7 @@ class Contender:
     Attributes:
         name: Its name in tables.
         policy: What acts.
-        card: Its card; None for the baseline.
+        card: Its card; None for the baseline, and for a policy that is in no file.
     """
 
     name: str
@@ -32,15 +35,32 @@ class Contender:
     @property
     def is_baseline(self) -> bool:
         """Whether it is the pure controller."""
-        return self.card is None
+        return isinstance(self.policy, type(policy.BASELINE))
 
     @property
     def identity(self) -> dict[str, str | None]:
-        """For logs and JSON: name, and hash of the card, in which that of the numbers is."""
-        digest = None
+        """For logs and JSON: name, and a hash.
+
+        It is the hash of the card, in which that of the numbers is; without a card, of the code and of
+        what the policy holds.
+
+        Raises:
+            ConfigError: If a policy without a card is in no file, or cannot be pickled.
+        """
+        if self.is_baseline:
+            return {"name": self.name, "sha256": None}
         if self.card is not None:
-            digest = hashlib.sha256(strict_json(self.card.as_dict()).encode()).hexdigest()
-        return {"name": self.name, "sha256": digest}
+            known = strict_json(self.card.as_dict()).encode()
+        else:
+            written = self.policy if inspect.isroutine(self.policy) else type(self.policy)
+            known = code("policy", written).encode() + self._pickled()
+        return {"name": self.name, "sha256": hashlib.sha256(known).hexdigest()}
+
+    def _pickled(self) -> bytes:
+        try:
+            return pickle.dumps(self.policy)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise ConfigError("policy", self.name, f"what can be pickled: {error}") from error
 
 
 BASELINE = Contender("baseline", policy.BASELINE)

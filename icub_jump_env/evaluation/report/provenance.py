@@ -82,13 +82,20 @@ def own_controller(config: JumpConfig) -> str | None:
         ConfigError: If its code is in no file.
     """
     kind = type(config.controller_config)
-    if kind in (VelocityConfig, TorqueConfig):
-        return None
+    return None if kind in (VelocityConfig, TorqueConfig) else code("controller", kind)
+
+
+def code(field: str, what: Any) -> str:
+    """Name of a class or function, and hash of the file that it is in.
+
+    Raises:
+        ConfigError: If it is in no file; names the field.
+    """
     try:
-        code = Path(inspect.getfile(kind)).read_bytes()
+        written = Path(inspect.getfile(what)).read_bytes()
     except (TypeError, OSError):
-        raise ConfigError("controller", kind.__qualname__, "a class in a file") from None
-    return f"{kind.__module__}.{kind.__qualname__} {hashlib.sha256(code).hexdigest()[:16]}"
+        raise ConfigError(field, what.__qualname__, "written in a file") from None
+    return f"{what.__module__}.{what.__qualname__} {hashlib.sha256(written).hexdigest()[:16]}"
 
 
 def versions(*more: str) -> dict[str, str]:
