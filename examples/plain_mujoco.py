@@ -1,14 +1,18 @@
 """The paper's jump in plain MuJoCo, without Gymnasium: the controllers as a library.
 
-    python examples/plain_mujoco.py
+    python examples/plain_mujoco.py            # joint velocities, eq. 3
+    python examples/plain_mujoco.py torque     # joint torques, eq. 6
 
 The robot's own sensors, servos and main loop stand where MuJoCo's are here.
 """
 
+import sys
+
 import mujoco
 import numpy as np
 
-from icub_jump_env import ResidualConfig, VelocityConfig
+from icub_jump_env import ResidualConfig, TorqueConfig, VelocityConfig
+from icub_jump_env.control.torque import TorqueController
 from icub_jump_env.control.velocity import VelocityController
 from icub_jump_env.estimation.feet_fixed import FeetFixedEstimator
 from icub_jump_env.estimation.readings import Readings
@@ -25,7 +29,7 @@ STIFFNESS, DAMPING = 1500.0, 50.0  # of the joint servos (Nm/rad, Nm s/rad)
 STEP = 0.001  # of the physics (s)
 
 
-def main() -> None:
+def main(kind: str = "velocity") -> None:
     """Jump, and say how high the robot rises."""
     robot = load_robot()
     plan = ScaledCurvePlanner(FeetFixedKinematics(robot)).plan(0.04)
@@ -33,7 +37,12 @@ def main() -> None:
     # The controller, its model of the robot, and the estimator that keeps the model up to date.
     kinematics = FeetFixedKinematics(robot)
     estimator = FeetFixedEstimator(kinematics)
-    controller = VelocityController(VelocityConfig(), kinematics)
+    if kind == "velocity":
+        config = VelocityConfig()
+        controller = VelocityController(config, kinematics)
+    else:
+        config = TorqueConfig()
+        controller = TorqueController(config, kinematics)
     controller.reset(plan.stance)
     reference = Reference(ResidualFilter(ResidualConfig().bandwidth))  # an agent may move it
 
@@ -46,8 +55,8 @@ def main() -> None:
     position, velocity = robot.crouch.copy(), np.zeros(robot.n_joints)  # what the servos follow
     take_off, highest = None, 0.0
 
-    for tick in range(300):  # 1.5 s at 200 Hz
-        time = tick / VelocityConfig().frequency
+    for tick in range(round(1.5 * config.frequency)):
+        time = tick / config.frequency
         readings.joint_position[:] = data.qpos[7:]
         readings.joint_velocity[:] = data.qvel[6:]
         state = estimator.estimate(readings)
@@ -55,7 +64,7 @@ def main() -> None:
             if tick == 0:
                 reference.start(plan, state.com)  # plans begin where the robot stands
             reference.update(time)
-            velocity = controller.command(state, reference.setpoint).velocity
+            command = controller.command(state, reference.setpoint)
         else:
             if take_off is None:
                 take_off = data.sensor("com").data[2].copy()
@@ -63,12 +72,12 @@ def main() -> None:
                     data.qpos[7:].copy(), plan.landing_posture, plan.retraction_time
                 )
             position, velocity = flight.sample(time - plan.duration)
-        for _ in range(round(1.0 / VelocityConfig().frequency / STEP)):
-            if time < plan.duration:
+        for _ in range(round(1.0 / config.frequency / STEP)):
+            if time < plan.duration and kind == "velocity":
+                velocity = command.velocity
                 position = position + STEP * velocity
-            data.ctrl[:] = STIFFNESS * (position - data.qpos[7:]) + DAMPING * (
-                velocity - data.qvel[6:]
-            )
+            servo = STIFFNESS * (position - data.qpos[7:]) + DAMPING * (velocity - data.qvel[6:])
+            data.ctrl[:] = command.torque if time < plan.duration and kind == "torque" else servo
             mujoco.mj_step(model, data)
             highest = max(highest, data.sensor("com").data[2])
     upright = data.sensor("com").data[2] > 0.3
@@ -76,4 +85,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

@@ -32,6 +32,7 @@ from icub_jump_env.errors import ICubJumpError
 from icub_jump_env.evaluation.cli import guarded, parse
 from icub_jump_env.evaluation.episodes.contender import read_contenders
 from icub_jump_env.evaluation.episodes.series import Series
+from icub_jump_env.evaluation.figures.style import name_origins
 from icub_jump_env.evaluation.quantities import CONTROLLERS
 from icub_jump_env.evaluation.report.output import say
 from icub_jump_env.evaluation.report.provenance import SOURCE, source, versions
@@ -129,8 +130,8 @@ def remake(options: EvidenceOptions) -> None:
         _make_rivals(controller, shipped, options.jobs, console)
         _ship(f"disturbed-{controller}", FELT_TEST, options.jobs, console)
     images = REPOSITORY / "docs" / "images"
-    learning_curves(RUNS).savefig(images / "learning.png")
-    learning_curves(RUNS, "disturbed-").savefig(images / "learning_disturbed.png")
+    name_origins(learning_curves(RUNS)).savefig(images / "learning.png")
+    name_origins(learning_curves(RUNS, "disturbed-")).savefig(images / "learning_disturbed.png")
     _run("docs/update.py")
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from experiments.shipped import CURVE_SUFFIX
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
     from experiments.feedback import Launches
     from experiments.frontier import Point
     from experiments.planners import Point as PlannerPoint
+
+CLOSE = 0.4
+"""Points nearer than this (cm) have their labels on either side."""
 
 
 def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
@@ -68,7 +72,7 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
             (f"{CM * h:g} cm", {"marker": m, "color": INK, "mfc": "none"})
             for h, m in markers.items()
         ),
-        ("meets the policy", {"marker": "o", "color": "k", "mfc": "none", "ms": 13}),
+        ("strongest baselines", {"marker": "o", "color": "k", "mfc": "none", "ms": 13}),
     ]
     handles = [Line2D([], [], ls="", label=label, **look) for label, look in shown]
     axis.legend(
@@ -80,15 +84,15 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
 
 
 def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
-    """Mean rise over the landing rate, a panel for each controller; labels name the command (cm).
+    """Mean rise over the landing rate, a panel for each controller and world; labels name the command.
 
     Commands below 5 cm, which all land, would hide each other.
     """
-    figure, (axes,) = panels((10.0, 4.6), columns=len(CONTROLLERS), sharey=True)
+    figure, axes = panels((8.0, 7.4), 2, len(CONTROLLERS), sharex=True, sharey=True)
     colors = dict(zip(("scaled_curve", "whole_body"), (DESIRED, MEASURED), strict=True))
-    fills = {"full": "full", "hard": "none"}
-    for axis, controller in zip(axes, CONTROLLERS, strict=True):
-        for (planner, color), (world, fill) in itertools.product(colors.items(), fills.items()):
+    cells = itertools.product(("full", "hard"), CONTROLLERS)
+    for axis, (world, controller) in zip(axes.flat, cells, strict=True):
+        for planner, color in colors.items():
             shown = [
                 p
                 for p in points
@@ -101,20 +105,25 @@ def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
             rises = CM * np.array([p.rise_interval for p in shown]).T
             axis.errorbar(
                 share, rise, np.abs(rises - rise), np.abs(shares - share), "o", color=color,
-                fillstyle=fill, elinewidth=0.7, ms=5, label=f"{planner}, {world}",
+                elinewidth=0.7, ms=5,
             )  # fmt: skip
-            left = fill == "none"
-            for k, (x, y, point) in enumerate(zip(share, rise, shown, strict=True)):
-                # Neighbours in turn below and above.
+            for x, y, point in zip(share, rise, shown, strict=True):
+                near = [other for other in rise if abs(other - y) < CLOSE]
                 axis.annotate(
                     f"{CM * point.jump_height:g}", (x, y), textcoords="offset points",
-                    xytext=(-6 if left else 6, 4 if k % 2 else -10),
-                    ha="right" if left else "left", fontsize=8, color=color,
+                    xytext=(5, 4 if y == max(near) else -11), fontsize=8, color=color,
                 )  # fmt: skip
-        axis.set_title(f"{controller} controller", fontsize=10)
-        axis.set(xlabel="landed (%)", xlim=(0, 107), ylim=(3, 8))
-    axes[0].set_ylabel("mean CoM rise (cm)")
-    axes[0].legend(frameon=False, loc="lower left", fontsize=8)
+        axis.set_title(f"{controller} controller, {world}", fontsize=10)
+        axis.set(xlim=(0, 112), ylim=(0, 8))
+    for axis in axes[-1]:
+        axis.set_xlabel("landed (%)")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("mean CoM rise (cm)")
+    handles = [Line2D([], [], color=c, marker="o", lw=0.7, label=n) for n, c in colors.items()]
+    figure.legend(
+        handles=handles, loc="outside lower center", frameon=False, ncols=2,
+        title="numbers: command from 5 cm on (cm); lines: 95 % intervals",
+    )  # fmt: skip
     return figure
 
 
@@ -147,7 +156,15 @@ def learning_curves(folder: Path, task: str = "") -> Figure:
             lines = axis.plot(steps, values.T, color=color, lw=0.6, alpha=0.5)
             lines[0].set_label(f"{controller}, each of {len(curves)} seeds")
             mean = interquartile_mean(values, axis=0)
-            axis.plot(steps, mean, color=color, lw=2.0, label=f"{controller}, interquartile mean")
+            axis.plot(
+                steps,
+                mean,
+                "o-",
+                color=color,
+                ms=4,
+                lw=2.0,
+                label=f"{controller}, interquartile mean",
+            )
         axis.set(xlabel="steps (thousand)", ylabel=label)
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
@@ -189,10 +206,18 @@ def feedback_figure(launches: Launches, residual: ResidualConfig) -> Figure:
                 for low, high in itertools.pairwise(edges)
             ]
             _band(rows[1, column], middles, bins, color, label)
-        describe(rows[0, column], f"{name}, by slope", unit, "time (ms)")
-        describe(rows[1, column], f"{name}, around a push", unit, "time since its end (ms)")
+        moved = f"{name} residual ({unit})"
+        describe(rows[0, column], "by the slope of the ground", moved, "time (ms)")
+        describe(rows[1, column], "around a push", moved, "time since the end of the push (ms)")
+        for axis in rows[:, column]:
+            axis.axhline(0.0, color="0.8", lw=0.8, zorder=0)
     for row in rows:
         row[0].legend(frameon=False, fontsize=8)
+    marks = Line2D([], [], color=INK, lw=1.8), Patch(color=INK, alpha=0.2, lw=0)
+    figure.legend(
+        marks, ("median of the episodes", "quartiles"),
+        loc="outside lower center", ncols=2, frameon=False, fontsize=8,
+    )  # fmt: skip
     return figure
 
 

@@ -8,6 +8,7 @@ import time
 from functools import partial
 from pathlib import Path
 
+import psutil
 import pytest
 from contenders import evaluate
 from local_cluster import two_nodes
@@ -91,6 +92,36 @@ def test_other_code_is_refused_with_what_differs(cluster, monkeypatch, capsys):
     code, out, err = evaluate(capsys, "--episodes", 2, "--cluster", cluster.address)
     assert (code, out) == (2, "")
     assert err.splitlines()[-1].startswith("error: node ")
+
+
+@pytest.mark.fault("killed workers")
+def test_a_worker_of_a_node_killed_at_any_time_changes_nothing(nodes, many, rng, capsys):
+    asked = ("--episodes", "6", "--randomization", "full", "--seed", "40", "--results")
+    code, out, _ = evaluate(capsys, *asked, "local.jsonl")
+    assert code == 0
+    for number in range(many(1, 30)):
+        log = f"{number}.jsonl"
+        words = [REPOSITORY / "eval.py", *asked, log, "--cluster", nodes[0]]
+        with subprocess.Popen(
+            [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as run:
+            while run.poll() is None and not (busy := busy_workers()):
+                time.sleep(0.02)
+            time.sleep(rng.uniform(0.0, 1.0))
+            busy[0].kill()
+            assert run.communicate() == (out, f"wrote {log}\n")
+        assert run.returncode == 0
+        assert Path(log).read_bytes() == Path("local.jsonl").read_bytes()
+
+
+def busy_workers():
+    """Processes of the nodes that answer a request."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            if process.cmdline()[:1] == ["ray::_answer"]:
+                found.append(process)
+    return found
 
 
 @pytest.mark.fault("lost cluster nodes")

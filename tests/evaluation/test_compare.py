@@ -77,11 +77,13 @@ class TestTable:
 
 class TestFigure:
     def test_bars_are_the_success_rates_with_their_intervals(self):
-        left, _ = compare_figure(ARMS, SuccessConfig(height_ratio=0.6)).axes
+        figure = compare_figure(ARMS, SuccessConfig(height_ratio=0.6))
+        left, _ = figure.axes
         assert [label.get_text() for label in left.get_xticklabels()] == ["4 to 5", "6 to 7"]
         assert (left.get_xlabel(), left.get_ylabel()) == ("command (cm)", "success (%)")
-        shown = [text.get_text() for text in left.get_legend().get_texts()]
-        assert shown == ["first", "second"]
+        (legend,) = figure.legends
+        shown = [text.get_text() for text in legend.get_texts()]
+        assert shown == ["first", "second", "95 % interval"]
         bars = {c.get_label(): c for c in left.containers if hasattr(c, "patches")}
         for name, counts in (("first", (3, 2)), ("second", (4, 3))):
             assert [bar.get_height() for bar in bars[name]] == [25.0 * n for n in counts]
@@ -114,7 +116,8 @@ class TestFigure:
     def test_names_are_shown_as_they_are(self, tmp_path):
         names = ["cost$1$", r"\$2", "_hidden", "a_b^c"]
         figure = compare_figure(dict.fromkeys(names, ARMS["first"]), SuccessConfig())
-        assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == names
+        (legend,) = figure.legends
+        assert [text.get_text() for text in legend.get_texts()][:-1] == names
         with rc_context({"svg.fonttype": "none"}):
             figure.savefig(tmp_path / "figure.svg")
         drawn = re.findall("<text [^>]*>(.*?)</text>", (tmp_path / "figure.svg").read_text())

@@ -80,12 +80,12 @@ def test_the_picture_has_the_middle_of_each_group():
     launches = Launches(time, np.zeros((n, k, 1)), np.repeat(actions[..., None], 3, 2), slope,
                         push, end)  # fmt: skip
     figure = feedback_figure(launches, CONFIG.residual)
-    rising, _, falling = figure.axes[0].lines
+    rising, _, falling, _ = figure.axes[0].lines
     cm = 6.0  # of an action forward of 1
     assert rising.get_label() == "rises ahead"
     assert rising.get_ydata()[:20].tolist() == pytest.approx([cm] * 20)
     assert falling.get_ydata()[:20].tolist() == pytest.approx([-cm] * 20)
-    forward, _, backward = figure.axes[3].lines
+    forward, _, backward, _ = figure.axes[3].lines
     after = forward.get_xdata() > 0
     assert (forward.get_ydata()[after] > 8 * cm).all()
     assert (backward.get_ydata()[after] < -8 * cm).all()

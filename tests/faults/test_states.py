@@ -28,7 +28,7 @@ def test_absurd_numbers_end_the_episode_and_leave_no_trace(many, rng, version):
         values = getattr(owner, name)
         kept = values.copy()
         values.flat[rng.integers(values.size)] = rng.choice(ABSURD)
-        for _ in range(300):
+        for _ in range(1000):  # a robot that is stuck sways for seconds before it falls
             observation, reward, terminated, _, info = env.step(ACTION)
             assert np.isfinite(observation).all()
             assert math.isfinite(reward)

@@ -24,9 +24,9 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
         episodes: The episodes of each contender, by its name.
         success: What counts as a success.
     """
-    figure, ((left, right),) = panels((9.0, 3.8), columns=2)
+    figure, ((left, right),) = panels((9.0, 4.2), columns=2)
     shift = 0.8 / len(episodes)
-    bars: list[Artist] = []
+    bars: dict[str, Artist] = {}
     for number, (name, series) in enumerate(episodes.items()):
         color = CONTENDERS[number % len(CONTENDERS)]
         groups = by_command(series)
@@ -38,7 +38,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
         bar = left.bar(
             places, shares, 0.9 * shift, yerr=errors, color=color, label=name, capsize=2
         )
-        bars.append(bar.patches[0])
+        bars[name] = bar.patches[0]
         names = [text.removesuffix(" cm") for text in command_labels(series).values()]
         left.set_xticks(range(len(groups)), names)
         for landed, marker in ((True, "."), (False, "x")):
@@ -50,6 +50,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
                 ms=4,
                 alpha=0.7,
                 color=color,
+                zorder=-number,  # the baseline is not hidden by the others
             )
     commands = [CM * e.jump_height for series in episodes.values() for e in series]
     ends = np.array([min(commands), max(commands)])
@@ -61,14 +62,14 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
     }
     left.set(xlabel="command (cm)", ylabel="success (%)", ylim=(0, 103))
     right.set(xlabel="command (cm)", ylabel="CoM rise (cm)")
-    above = {"ncols": 3, "loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
-    _name(left, dict(zip(episodes, bars, strict=True)), **above)
+    interval = Line2D([], [], ls="", marker="|", ms=10, color="k")
+    _name(figure, bars | {"95 % interval": interval}, loc="outside upper center", ncols=4)
     _name(right, meanings)
     return figure
 
 
-def _name(axis: Axes, artists: Mapping[str, Artist], **place: Any) -> None:
+def _name(where: Axes | Figure, artists: Mapping[str, Artist], **place: Any) -> None:
     """A legend that shows names as they are: matplotlib takes some signs in them for its own."""
-    legend = axis.legend(artists.values(), artists.keys(), frameon=False, fontsize=8, **place)
+    legend = where.legend(artists.values(), artists.keys(), frameon=False, fontsize=8, **place)
     for text in legend.get_texts():
         text.set_parse_math(False)

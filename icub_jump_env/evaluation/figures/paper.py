@@ -63,7 +63,7 @@ def paper_figures(
 
 
 def com_reference_figure(config: JumpConfig) -> Figure:
-    """Fig. 1: vertical CoM reference, velocity and acceleration."""
+    """Fig. 1: velocity and acceleration of the vertical CoM reference."""
     plan = planned(config)
     time = np.linspace(0.0, plan.duration, 400)
     figure, ((velocity, acceleration),) = panels((WIDTH, 2.6), columns=2)
@@ -88,6 +88,9 @@ class _Shown(NamedTuple):
     unit: str
     limit: Callable[[Robot], NDArray[np.float64]]
 
+
+LIMIT = "-."
+"""Style of the line at a joint's limit."""
 
 _LAUNCH: dict[ControllerName, _Shown] = {
     "velocity": _Shown(
@@ -162,7 +165,7 @@ def _draw_joints(axes: Sequence[Axes], config: JumpConfig, trace: Trace) -> None
         limit = shown.limit(robot)[index]
         if float(np.abs(measured[launch]).max()) > 0.8 * limit:
             sign = np.sign(measured[launch][-1])
-            axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=":")
+            axis.axhline(sign * limit, color=ACCENT, lw=0.8, ls=LIMIT)
         describe(axis, f"left {joint.replace('_', ' ')}", shown.unit)
 
 
@@ -178,7 +181,6 @@ def _draw_height(axis: Axes, config: JumpConfig, trace: Trace, estimated: bool =
         axis.plot(time, true, color=MEASURED)
     axis.plot(time, [s.com_reference[2] for s in early], color=DESIRED, ls="--")
     mark_takeoff(axis, duration)
-    axis.annotate("T", (duration, min(true)), color=ACCENT, ha="left")
     describe(axis, "CoM height", "m")
 
 
@@ -186,11 +188,11 @@ def _add_legend(figure: Figure, estimated: bool = False) -> None:
     styles = [("estimated" if estimated else "measured", MEASURED, "-")]
     if estimated:
         styles.append(("true", ACCENT, "-"))
-    styles += [("desired", DESIRED, "--"), ("limit; T: take-off", ACCENT, ":")]
+    styles += [("desired", DESIRED, "--"), ("limit", ACCENT, LIMIT), ("take-off", ACCENT, ":")]
     handles = [Line2D([], [], color=color, ls=ls, label=label) for label, color, ls in styles]
     figure.legend(
         handles=handles, frameon=False, loc="outside lower center",
-        ncols=4, columnspacing=1.0, fontsize=9,
+        ncols=len(styles), columnspacing=1.0, fontsize=9, handlelength=1.5,
     )  # fmt: skip
 
 

@@ -45,14 +45,13 @@ def policy_figure(config: JumpConfig, policy: Episode, baseline: Episode) -> Fig
         shown = [s for s in episode.trace if s.time <= takeoff + _AFTER]
         times = [s.time for s in shown]
         height.plot(times, [s.com[2] for s in shown], color=color, label=name)
-        pitch.plot(times, [DEG * s.base_pitch for s in shown], color=color)
+        pitch.plot(times, [DEG * s.base_pitch for s in shown], color=color, label=name)
     for axis, title, unit in (
         (offset, "offset of the CoM reference", "cm"),
         (height, "CoM height", "m"),
         (pitch, "base pitch (positive: forward)", "deg"),
     ):
         describe(axis, title, unit)
-        mark_takeoff(axis, takeoff, "commanded take-off" if axis is height else None)
-    offset.legend(frameon=False)
-    height.legend(frameon=False)
+        mark_takeoff(axis, takeoff, "commanded take-off")
+        axis.legend(frameon=False, fontsize=8)
     return figure

@@ -17,7 +17,10 @@ from icub_jump_env.evaluation.quantities import CM, CONTROLLERS, DEG
 if TYPE_CHECKING:
     from icub_jump_env.evaluation.modes.study import CaseResult
 
-_ROWS = (("flight_height", CM, "CoM rise (cm)"), ("flight_rotation", DEG, "rotation (deg)"))
+_COLUMNS = (
+    ("flight_height", CM, "CoM rise (cm)"),
+    ("flight_rotation", DEG, "rotation in flight (deg)"),
+)
 
 
 def realism_figure(results: Sequence[CaseResult]) -> Figure:
@@ -27,26 +30,26 @@ def realism_figure(results: Sequence[CaseResult]) -> Figure:
         results: The study's results, grouped.
 
     Returns:
-        One column per group; how many landed shows in the markers.
+        One row of panels per group; how many landed shows in the markers.
     """
     groups = [(name, list(members)) for name, members in groupby(results, lambda r: r.case.group)]
     figure, axes = panels(
-        (16.0, 6.4), len(_ROWS), len(groups), sharex="col", sharey="row",
-        width_ratios=[len(members) for _, members in groups],
+        (7.5, 10.0), len(groups), len(_COLUMNS), sharex="col", sharey="row",
+        height_ratios=[len(members) + 0.5 for _, members in groups],
     )  # fmt: skip
-    for column, (name, members) in enumerate(groups):
-        for row, (metric, scale, label) in enumerate(_ROWS):
-            axis = axes[row, column]
+    for (name, members), row in zip(groups, axes, strict=True):
+        for axis, (metric, scale, label) in zip(row, _COLUMNS, strict=True):
             for offset, controller in zip((-0.12, 0.12), CONTROLLERS, strict=True):
                 _points(axis, members, controller, metric, scale, offset)
+            axis.axvline(0.0, color="0.8", lw=0.8)
             axis.grid(axis="y", color="0.9")
-            if column == 0:
-                axis.set_ylabel(label)
-        axes[0, column].set_title(name, fontsize=10)
-        axes[-1, column].set_xticks(
-            range(len(members)), [r.case.label for r in members], rotation=90, fontsize=8
-        )
-    figure.legend(handles=_legend(), loc="outside lower center", ncols=5, frameon=False)
+            axis.tick_params(labelbottom=True)
+            if members is groups[-1][1]:
+                axis.set_xlabel(label)
+        row[0].set_title(name, fontsize=10, loc="left")
+        row[0].set_yticks(range(len(members)), [r.case.label for r in members], fontsize=9)
+        row[0].set_ylim(len(members) - 0.5, -0.5)
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
@@ -59,13 +62,13 @@ def _points(
     offset: float,
 ) -> None:
     color = CONTROLLER[controller]
-    for x, result in enumerate(members):
+    for y, result in enumerate(members):
         summary = result.summaries[controller]
         low, middle, high = scale * np.array(summary.percentiles[metric])
-        axis.plot([x + offset] * 2, [low, high], color=color, lw=1.5)
+        axis.plot([low, high], [y + offset] * 2, color=color, lw=1.5)
         share = summary.landed.share
         axis.plot(
-            x + offset, middle, ls="", color=color, ms=6,
+            middle, y + offset, ls="", color=color, ms=5,
             marker="x" if share == 0.0 else "o",
             markerfacecolor=color if share == 1.0 else "white",
         )  # fmt: skip
@@ -82,4 +85,5 @@ def _legend() -> list[Line2D]:
             ("o", "0.3", "all landed"), ("o", "white", "some landed"), ("x", "0.3", "none landed")
         )
     ]  # fmt: skip
-    return [*controllers, *shares]
+    spread = Line2D([], [], color="0.3", lw=1.5, label="10 to 90 % of episodes")
+    return [*controllers, *shares, spread]

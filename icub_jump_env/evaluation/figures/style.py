@@ -17,7 +17,7 @@ MEASURED, DESIRED, ACCENT = "#1f6f8b", "#d1495b", "#8d99ae"
 """Of curves: what happened, what was wanted, and what stands beside them."""
 
 CONTROLLER: dict[ControllerName, str] = {"velocity": MEASURED, "torque": DESIRED}
-CONTENDERS = ("0.55", "#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7")
+CONTENDERS = ("0.35", "#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7")
 """Of those that are compared, in their order; the first one is the baseline. The others are of Okabe and
 Ito's palette, which readers who see fewer colours tell apart."""
 
@@ -31,6 +31,8 @@ PAGE = {
 least 4.5 to the page."""
 
 DPI = 150
+NOT_FROM_ZERO = ", not from 0"
+"""At an axis."""
 
 _ON_A_PAGE: dict[Any, Any] = {
     **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor"), INK),
@@ -65,6 +67,16 @@ def mark_takeoff(axis: Axes, time: float, label: str | None = None) -> None:
     axis.axvline(time, color=ACCENT, lw=0.8, ls=":", label=label)
 
 
+def name_origins(figure: Figure) -> Figure:
+    """Say at each named axis that leaves out zero that it does."""
+    for axis in figure.axes:
+        for one in (axis.xaxis, axis.yaxis):
+            label, (low, high) = one.get_label_text(), sorted(one.get_view_interval())
+            if label and not low <= 0.0 <= high and not label.endswith(NOT_FROM_ZERO):
+                one.set_label_text(f"{label}{NOT_FROM_ZERO}")
+    return figure
+
+
 def on_a_page() -> AbstractContextManager[None]:
     """Figures drawn meanwhile suit :func:`svg`."""
     return matplotlib.rc_context(_ON_A_PAGE)
@@ -87,7 +99,7 @@ def svg(figure: Figure) -> tuple[bytes, int, int]:
     """
     buffer = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(buffer, format="svg", transparent=True, metadata=nothing)
+    name_origins(figure).savefig(buffer, format="svg", transparent=True, metadata=nothing)
     drawing = buffer.getvalue()
     for name, (drawn, *_) in PAGE.items():
         drawing = drawing.replace(drawn, f"var(--{name})")

@@ -89,10 +89,12 @@ def write_figures(
     folder: Path, figures: Mapping[str, Callable[[], Figure]], console: Console
 ) -> None:
     """Draw pictures into a folder, which is made if need be; those without OpenGL are left out."""
+    from icub_jump_env.evaluation.figures.style import name_origins
+
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in figures.items():
         try:
-            draw().savefig(folder / name)
+            name_origins(draw()).savefig(folder / name)
         except MissingDependencyError as error:
             say(console, f"left out {name}: {error}")
         else:
