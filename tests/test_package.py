@@ -141,6 +141,14 @@ def test_wheel_ships_the_package_alone(wheel):
     assert not [name for name in names if Path(name).suffix in (".stl", ".urdf", ".dae", ".png")]
 
 
+def test_links_of_the_description_lead_somewhere_on_any_page(wheel):
+    content = zipfile.ZipFile(wheel)
+    (name,) = [name for name in content.namelist() if name.endswith("METADATA")]
+    targets = re.findall(r"\]\(([^)]+)\)", content.read(name).decode())
+    assert len(targets) > 20
+    assert all(target.startswith(("https://", "#")) for target in targets)
+
+
 def test_wheel_ships_the_agents_the_policies_and_the_command(wheel):
     content = zipfile.ZipFile(wheel)
     names = set(content.namelist())

@@ -1,6 +1,8 @@
 """The benchmark: its episodes are those of the environment, and the command says so."""
 
+import importlib
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +89,15 @@ def test_a_policy_is_an_entry(few, tmp_path, capsys):
     assert "ours [/x]" in capsys.readouterr().out
     bench(["d.json", "--policy", "disturbed-torque"])
     assert Result.read(tmp_path / "d.json").entry == "ICubJump-v1, torque, disturbed-torque"
+
+
+def test_the_code_of_the_page_runs(few, tmp_path, monkeypatch):
+    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "benchmark.md").read_text(), re.DOTALL)
+    module = code.replace('__name__ == "__main__"', "True").replace("jobs=2", "jobs=1")
+    (tmp_path / "mine.py").write_text(module)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    importlib.import_module("mine")
+    assert Result.read(tmp_path / "mine.json").entry == "mine"
 
 
 def test_the_leaderboard_has_all_that_was_entered():

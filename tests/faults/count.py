@@ -2,6 +2,7 @@
 
 python tests/faults/count.py             # hours; an interrupted run goes on
 python tests/faults/count.py --quick     # what the test suite does, minutes
+python tests/faults/count.py --fault soak
 """
 
 import argparse
@@ -40,8 +41,9 @@ class Count:
         entries: The lines, of this code alone.
     """
 
-    def __init__(self, file):
-        self._file, self._code, self._cases = file, code(), Counter()
+    def __init__(self, file, fault):
+        self._file, self._fault = file, fault
+        self._code, self._cases = code(), Counter()
         self.entries = []
         for line in file.read_text().splitlines() if file.exists() else []:
             with contextlib.suppress(ValueError):  # half a line
@@ -55,11 +57,15 @@ class Count:
         from hypothesis import is_hypothesis_test  # pytest wants to be first
 
         done = {e["test"] for e in self.entries if not e["failed"] and not e["skipped"]}
-        items[:] = [item for item in items if item.nodeid not in done]
+        items[:] = [item for item in items if item.nodeid not in done and self._wants(item)]
         # A test with parameters is several items.
         for function in {item.function for item in items if is_hypothesis_test(item.obj)}:
             handle = function.hypothesis
             handle.inner_test = self._counted(handle.inner_test, function)
+
+    def _wants(self, item):
+        marker = item.get_closest_marker("fault")
+        return marker is not None and self._fault in (None, *marker.args)
 
     def _counted(self, test, function):
         """A test that counts its examples, without those that it rejects."""
@@ -113,14 +119,16 @@ def main():
     """Run the tests that have a fault, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--quick", action="store_true")
-    quick = parser.parse_args().quick
+    parser.add_argument("--fault", help="try this one alone")
+    options = parser.parse_args()
+    quick = options.quick
     file = Path("results") / f"faults{'-quick' if quick else ''}.jsonl"
     file.parent.mkdir(exist_ok=True)
     if quick:
         file.unlink(missing_ok=True)
     elif file.exists():
         print(f"going on with {file}; without it, all is tried again", file=sys.stderr)
-    count, printed = Count(file), io.StringIO()
+    count, printed = Count(file, options.fault), io.StringIO()
     words = [str(REPOSITORY / "tests"), "-m", "fault", "-q", *([] if quick else ["--full"])]
     with contextlib.redirect_stdout(printed):
         ended = pytest.main(words, plugins=[count])
