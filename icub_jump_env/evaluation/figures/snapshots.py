@@ -19,7 +19,7 @@ from icub_jump_env.evaluation.figures.style import INK
 STRIP_WIDTH = 1600
 """Width of the strip (pixels)."""
 
-_CROP = (slice(10, 450), slice(60, 500))
+_CROP = (slice(0, 460), slice(60, 520))
 """Rows and columns of a picture where the robot is, upright or fallen on its back."""
 
 _ENDS = {"stood": "Stands", "fell": "Falls"}
