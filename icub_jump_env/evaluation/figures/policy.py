@@ -53,5 +53,6 @@ def policy_figure(config: JumpConfig, policy: Episode, baseline: Episode) -> Fig
     ):
         describe(axis, title, unit)
         mark_takeoff(axis, takeoff, "commanded take-off")
-        axis.legend(frameon=False, fontsize=8)
+        place = "upper left" if axis is offset else "upper right"
+        axis.legend(frameon=False, fontsize=8, loc=place)
     return figure
