@@ -2,6 +2,7 @@
 
     pip install drake==1.51.1
     python -m experiments.second_engine --jobs 2
+    python -m experiments.second_engine --jobs 2 --modulus 1e7     # a harder floor
 
 Drake gets masses, joints, friction, gravity and the shapes that touch the ground of each world as it
 was drawn. The rest is its own: multibody dynamics, the solver of contacts (SAP), and contacts as pressure over
@@ -55,7 +56,7 @@ from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
 from experiments.seeds import ENGINE
-from icub_jump_env.checks import check_count
+from icub_jump_env.checks import check_count, check_number
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.env import ICubJumpEnv
 from icub_jump_env.errors import ConfigError
@@ -72,12 +73,14 @@ from icub_jump_env.versions import VERSIONS
 
 Array = NDArray[np.float64]
 
-RUBBER_MODULUS, RUBBER_THICKNESS = 1e6, 0.005
-"""Of what covers the floor (Pa, m)."""
+RUBBER_THICKNESS = 0.005
+"""Of what covers the floor (m)."""
 RELAXATION_TIME = 0.005
 """Of the rubber, by which a contact is damped (s), half of it from each shape."""
 INFINITE = 1e6
 """A coefficient of friction that leaves the other one's in the harmonic mean."""
+MODULUS = 1e6
+"""Of that (Pa): under a sole that carries half the robot it gives way by less than 0.1 mm."""
 LAW, POLICY = "law, 5 cm, disturbed", "policy, 5 cm, disturbed"
 
 
@@ -89,7 +92,14 @@ class Twin:
         context: Its state.
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, modulus: float) -> None:
+        """Build it.
+
+        Args:
+            model: What is described.
+            modulus: Of what covers the floor (Pa).
+        """
+        self._modulus = modulus
         builder = DiagramBuilder()
         config = MultibodyPlantConfig(
             time_step=model.opt.timestep,
@@ -226,7 +236,7 @@ class Twin:
         properties.AddProperty("material", "relaxation_time", RELAXATION_TIME / 2.0)
         if name == FLOOR_GEOM:
             AddCompliantHydroelasticPropertiesForHalfSpace(
-                RUBBER_THICKNESS, RUBBER_MODULUS, properties
+                RUBBER_THICKNESS, self._modulus, properties
             )
             shape: Any = HalfSpace()
         else:
@@ -254,7 +264,13 @@ def _centre_of_pressure(point: Array, force: SpatialForce) -> Array:
 
 
 class DrakePhysics(Physics):
-    """The world of :class:`Physics`, moved by Drake: MuJoCo's arrays say what came of it."""
+    """The world of :class:`Physics`, moved by Drake: MuJoCo's arrays say what came of it.
+
+    Attributes:
+        modulus: Of what covers the floor (Pa).
+    """
+
+    modulus: float = MODULUS
 
     def __init__(self, robot: Robot, *arguments: Any, **keywords: Any) -> None:
         super().__init__(robot, *arguments, **keywords)
@@ -267,7 +283,7 @@ class DrakePhysics(Physics):
         if set(BLOCK_GEOMS) & {self.model.geom(k).name for k in range(self.model.ngeom)}:
             raise ConfigError("randomization", "blocks", "level ground: Drake's does not change")
         super().reset(qpos)
-        self._twin = Twin(self.model)
+        self._twin = Twin(self.model, self.modulus)
 
     def start_from_rest(self) -> None:
         """Stop all motion and set the time to zero."""
@@ -298,11 +314,13 @@ class DrakePhysics(Physics):
 
 
 class DrakeEnv(ICubJumpEnv):
-    """The environment, in Drake, whose steps are not compiled."""
+    """The environment, in Drake on a floor of this modulus (Pa); its steps are not compiled."""
 
-    _engine = DrakePhysics
+    def __init__(self, floor: float = MODULUS, **config: Any) -> None:
+        class Engine(DrakePhysics):
+            modulus = floor
 
-    def __init__(self, **config: Any) -> None:
+        self._engine = Engine
         super().__init__(**config | {"physics_loop": "python"})
 
 
@@ -313,14 +331,17 @@ class EngineOptions:
     Attributes:
         jobs: Processes that work in parallel.
         episodes: Of each row in each simulator.
+        modulus: Of the rubber on Drake's floor (Pa).
     """
 
     jobs: int = 1
     episodes: int = 100
+    modulus: float = MODULUS
 
     def __post_init__(self) -> None:
         check_count("jobs", self.jobs, 1, unit="processes")
         check_count("episodes", self.episodes, 1, len(ENGINE))
+        check_number("modulus", self.modulus, 1e4, 1e9, "Pa")
 
 
 def rows(controller: str) -> dict[str, tuple[JumpConfig, Policy]]:
@@ -339,12 +360,12 @@ def rows(controller: str) -> dict[str, tuple[JumpConfig, Policy]]:
 
 
 def jump(
-    config: JumpConfig, policy: Policy, drake: bool, of_seeds: Sequence[int]
+    config: JumpConfig, policy: Policy, modulus: float | None, of_seeds: Sequence[int]
 ) -> list[Episode]:
-    """Episodes in one of the simulators."""
+    """Episodes in Drake, on a floor of this modulus (Pa), or in MuJoCo if it is None."""
     logging.getLogger("drake").setLevel(logging.ERROR)  # it warns of half spaces and soft bodies
     whole = config.replace(early_end=False)
-    env = DrakeEnv(**vars(whole)) if drake else make_env(whole)
+    env = make_env(whole) if modulus is None else DrakeEnv(modulus, **vars(whole))
     return [run_episode(env, seed, policy) for seed in of_seeds]
 
 
@@ -366,7 +387,7 @@ def run(options: EngineOptions) -> None:
     chosen = ENGINE[: options.episodes]
     table = new_table(
         2, "controller", "jump", "MuJoCo, %", "Drake, %", "difference", "MuJoCo, cm", "Drake, cm",
-        "difference", title=f"Success and rise in two simulators, {seeds(chosen)}",
+        "difference", title=f"Success and rise in two simulators, {seeds(chosen)}, floor of {options.modulus:.0e} Pa",
     )  # fmt: skip
     parts = [chosen[k :: options.jobs] for k in range(options.jobs)]
     compared: dict[str, Difference] = {}
@@ -375,8 +396,8 @@ def run(options: EngineOptions) -> None:
             done: dict[str, list[list[Episode]]] = {}
             for name, (config, policy) in rows(controller).items():
                 done[name] = []
-                for drake in (False, True):
-                    work = [pool.submit(jump, config, policy, drake, part) for part in parts]
+                for modulus in (None, options.modulus):
+                    work = [pool.submit(jump, config, policy, modulus, part) for part in parts]
                     every = [episode for part in work for episode in part.result()]
                     done[name].append(sorted(every, key=lambda episode: episode.seed))
                 table.add_row(controller, name, *cells(*done[name]))

@@ -97,7 +97,9 @@ def test_nothing_advises_to_install_the_package_from_an_index():
         for file in (REPOSITORY / folder).rglob("*.py")
     ]
     for file in (*sources, *DOCUMENTS):
-        assert not re.search(r"pip install (?!git\+)[^\n`]*icub-jump\b(?!-)", file.read_text()), file
+        assert not re.search(r"pip install (?!git\+)[^\n`]*icub-jump\b(?!-)", file.read_text()), (
+            file
+        )
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: str(d.relative_to(REPOSITORY)))

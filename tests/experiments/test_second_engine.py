@@ -8,7 +8,7 @@ from icub_jump_env.config import JumpConfig
 
 pytest.importorskip("pydrake")
 
-from experiments.second_engine import DrakeEnv, Twin
+from experiments.second_engine import MODULUS, DrakeEnv, Twin
 from icub_jump_env.simulation.physics import Physics
 
 
@@ -27,7 +27,7 @@ def moving(physics, rng):
     data.qpos[3:7] /= np.linalg.norm(data.qpos[3:7])
     data.qvel[:] = rng.normal(size=model.nv)
     data.ctrl[:] = rng.uniform(-5.0, 5.0, model.nu)
-    twin = Twin(model)
+    twin = Twin(model, MODULUS)
     twin.set_state(data.qpos, data.qvel)
     mujoco.mj_forward(model, data)
     return model, data, twin
