@@ -387,7 +387,7 @@ def run(options: EngineOptions) -> None:
     chosen = ENGINE[: options.episodes]
     table = new_table(
         2, "controller", "jump", "MuJoCo, %", "Drake, %", "difference", "MuJoCo, cm", "Drake, cm",
-        "difference", title=f"Success and rise in two simulators, {seeds(chosen)}, floor of {options.modulus:.0e} Pa",
+        "difference", title=f"Success and rise in two simulators, {seeds(chosen)}",
     )  # fmt: skip
     parts = [chosen[k :: options.jobs] for k in range(options.jobs)]
     compared: dict[str, Difference] = {}
