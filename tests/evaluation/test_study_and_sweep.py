@@ -39,6 +39,17 @@ def case(label, group=None):
     return found
 
 
+@pytest.mark.parametrize("name", ["realism", "constraints", "launch_end", "robots"])
+def test_what_is_below_the_table_is_of_its_columns(name):
+    asked = STUDIES[name]
+    caption = study.render(asked, [], EvalOptions(SHORT, study=name)).caption
+    assert ("control ticks without a solution" in caption) == ("unsolved" in asked.columns)
+    assert ("rotation" in caption) == ("rot." in asked.columns)
+    assert ("soles" in caption) == ("soles" in asked.columns)
+    for heading in ("landed", "success"):
+        assert (heading in caption.split("episodes;")[1]) == (heading in asked.columns)
+
+
 class TestRealism:
     def test_delays_of_0_to_3_ticks(self):
         delays = [c.changes for c in cases.realism() if c.group == "computation time"]

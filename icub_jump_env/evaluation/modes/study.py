@@ -71,6 +71,13 @@ def share(rate: Rate) -> str:
 _RISE = {"rise": _median("flight_height", "cm"), "10 to 90 %": _rise_spread}
 _ROTATION = {"rot.": _median("flight_rotation", "deg")}
 _LANDED = {"landed": lambda summary: share(summary.landed)}
+_MEDIANS = {
+    "rise": "rise of the CoM in cm",
+    "soles": "rise of the soles in cm",
+    "rot.": "rotation in flight in deg",
+    "unsolved": "control ticks without a solution",
+}
+"""What headings mean, below the table."""
 
 STUDIES = {
     "realism": Study("Realism study", cases.realism, _RISE | _ROTATION | _LANDED),
@@ -171,11 +178,12 @@ def render(study: Study, results: Sequence[CaseResult], options: EvalOptions) ->
             table.add_row(f"[bold]{group}[/bold]")
         cells = [cell(result.summaries[c]) for c in CONTROLLERS for cell in study.columns.values()]
         table.add_row(f"{'  ' if group else ''}{result.case.label}", *cells)
-    count = options.episodes or STUDY_EPISODES
+    medians = [meaning for heading, meaning in _MEDIANS.items() if heading in study.columns]
+    shares = [heading for heading in ("landed", "success") if heading in study.columns]
     table.caption = (
-        "vel., tor.: velocity and torque controller; rise of the CoM in cm, rotation in flight in "
-        f"deg, control ticks without a solution: medians of {count} episodes; landed, success: "
-        "share in % (95 % interval). Where nothing else is random, link masses vary by 0.1 %"
+        f"vel., tor.: velocity and torque controller; {', '.join(medians)}: medians of "
+        f"{options.episodes or STUDY_EPISODES} episodes; {', '.join(shares)}: share in % (95 % interval). "
+        "Where nothing else is random, link masses vary by 0.1 %"
     )
     return table
 
