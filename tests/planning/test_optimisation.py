@@ -1,13 +1,18 @@
 """Making whole-body plans: the sagittal model, the program, and what the shipped plans keep."""
 
+import dataclasses
+import json
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from experiments.collision_shapes import hulls
 from icub_jump_env.config import JumpConfig
-from icub_jump_env.errors import ConfigError
+from icub_jump_env.errors import ConfigError, PlanningError
 from icub_jump_env.evaluation.episodes.rollout import make_env
+from icub_jump_env.files import strict_json
 from icub_jump_env.planning.whole_body.family import family_of
 from icub_jump_env.planning.whole_body.margins import MARGINS, LandingMargins, LaunchMargins
 from icub_jump_env.robot.dynamics import FeetFixedDynamics
@@ -18,7 +23,11 @@ from icub_jump_env.robot.urdf import model_path
 
 pytest.importorskip("casadi")
 
+from icub_jump_env.planning.whole_body import build
+from icub_jump_env.planning.whole_body.binding import binding
+from icub_jump_env.planning.whole_body.landing import LandingProgram
 from icub_jump_env.planning.whole_body.launch import (
+    Launch,
     LaunchProgram,
     largest_speeds,
     largest_torques,
@@ -187,6 +196,88 @@ def test_a_search_finds_the_shipped_plan_again(model):
     np.testing.assert_allclose(
         model.posture(launch.q), FAMILY.position[heights.index(0.05)], atol=1e-4
     )
+
+
+@pytest.mark.parametrize("name", MARGINS)
+def test_the_shipped_plans_were_made_with_these_margins(name):
+    asked = json.loads(strict_json(dataclasses.asdict(MARGINS[name])))
+    assert FAMILIES[name].card["margins"] == asked
+
+
+def shipped_launch(model, name, member):
+    """The launch of a shipped plan, with what the model says of it."""
+    family = FAMILIES[name]
+    columns = [family.position[member], family.velocity[member], family.acceleration[member]]
+    q, v, a = (np.array([coordinates(ROBOT, x) for x in column]) for column in columns)
+    knots = [values(model, *knot) for knot in zip(q, v, a, strict=True)]
+    outputs = {key: np.array([knot[key] for knot in knots]) for key in knots[0]}
+    plan = family.card["plans"][member]
+    return Launch(family.duration[member], q, v, a, outputs, plan["height"], 0, 0.0)
+
+
+@pytest.mark.parametrize(("name", "member"), MEMBERS)
+def test_what_binds_is_found_again(model, name, member):
+    margins = MARGINS[name].branches[FAMILIES[name].branch[member]].launch
+    found = binding(model, shipped_launch(model, name, member), margins)
+    told = FAMILIES[name].card["plans"][member]["binding"]
+    assert {limit: list(times) for limit, times in found.items()} == told
+
+
+@pytest.mark.parametrize(
+    ("name", "member"), [MEMBERS[-1], MEMBERS[len(FAMILY.rise) - 1], MEMBERS[6]]
+)
+def test_the_landing_posture_is_found_again(model, name, member):
+    family = FAMILIES[name]
+    margins = MARGINS[name].branches[family.branch[member]].landing
+    program = LandingProgram(model, margins)
+    posture = program.solve(shipped_launch(model, name, member))
+    np.testing.assert_allclose(model.posture(posture), family.landing[member], atol=1e-4)
+    assert family.retraction[member] == margins.retraction
+
+
+class Staircase:
+    """A program that finds every launch up to a height."""
+
+    def __init__(self, highest, infeasible=()):
+        self.model = SimpleNamespace(robot=ROBOT)
+        self.top, self.infeasible, self.asked = highest, infeasible, []
+
+    def keep(self, margins):
+        self.kept = margins
+
+    def launch(self, rise):
+        violation = 1.0 if rise in self.infeasible else 0.0
+        return Launch(0.3, np.full((2, 6), rise), None, None, {}, rise, 0, violation)
+
+    def highest(self, crouch, takeoff):
+        return self.launch(self.top)
+
+    def to_height(self, height, above, crouch):
+        self.asked.append((height, above.rise, crouch[0]))
+        return self.launch(height)
+
+
+def test_a_branch_goes_from_its_highest_down_and_keeps_its_own():
+    branch = MARGINS["velocity"].branches[0]
+    program = Staircase(0.083)
+    found = [launch.rise for launch in build._branch(program, branch)]
+    np.testing.assert_allclose(found, [0.015, 0.02, 0.03, 0.04, 0.05, 0.06])
+    assert program.kept is branch.launch
+    heights, above, crouch = zip(*program.asked, strict=True)
+    np.testing.assert_allclose(heights, [0.06, 0.05, 0.04, 0.03, 0.02, 0.015])
+    assert above == (0.083, *heights[:-1])
+    assert crouch == (0.083,) * 6
+    # What the highest launch does not reach is left out.
+    found = [launch.rise for launch in build._branch(Staircase(0.034), branch)]
+    np.testing.assert_allclose(found, [0.015, 0.02, 0.03, 0.034])
+
+
+def test_a_branch_without_a_launch_is_refused():
+    branch = MARGINS["velocity"].branches[0]
+    with pytest.raises(PlanningError, match="keeps the limits"):
+        build._branch(Staircase(0.08, [0.08]), branch)
+    with pytest.raises(PlanningError, match=r"to 1\.5 cm"):
+        build._branch(Staircase(0.08, [0.015]), branch)
 
 
 class Hulls:
