@@ -365,11 +365,12 @@ class TestSlip:
         assert recorder.metrics.sole_slip == 0.0
 
 
-def test_still_is_who_has_been_slow_since():
+@pytest.mark.parametrize("fast", [(0.051, 0.0, 0.0), (0.0, -0.051, 0.0), (0.0, 0.0, 0.051)])
+def test_still_is_who_has_been_slow_since(fast):
     """Slow for 0.2 s, then in one direction too fast, then slow for 0.3 s."""
     recorder = JumpRecorder(LIMITS, 1.0)
     for step in range(501):
-        velocity = (0.0, -0.051, 0.0) if step == 200 else (0.03, 0.0, -0.039)
+        velocity = fast if step == 200 else (0.03, 0.0, -0.039)
         recorder.update(state(step * DT, com_velocity=velocity))
         if step == 199:
             assert recorder.metrics.still_time == pytest.approx(0.199)
@@ -378,6 +379,12 @@ def test_still_is_who_has_been_slow_since():
     assert recorder.metrics.still_time == pytest.approx(0.3)
     recorder.reset()
     assert recorder.metrics.still_time == 0.0
+
+
+def test_metrics_that_nobody_recorded_are_those_before_anything_happened():
+    recorder = JumpRecorder(LIMITS, 1.0)
+    recorder.reset()
+    np.testing.assert_equal(JumpMetrics().as_dict(), recorder.metrics.as_dict())
 
 
 def test_lean_is_that_of_the_end():
