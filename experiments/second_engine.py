@@ -385,9 +385,10 @@ def cells(ours: Sequence[Episode], theirs: Sequence[Episode]) -> list[str]:
 def run(options: EngineOptions) -> None:
     """Jump and print."""
     chosen = ENGINE[: options.episodes]
+    floor = "" if options.modulus == MODULUS else f", floor of {options.modulus:.0e} Pa"
     table = new_table(
         2, "controller", "jump", "MuJoCo, %", "Drake, %", "difference", "MuJoCo, cm", "Drake, cm",
-        "difference", title=f"Success and rise in two simulators, {seeds(chosen)}",
+        "difference", title=f"Success and rise in two simulators, {seeds(chosen)}{floor}",
     )  # fmt: skip
     parts = [chosen[k :: options.jobs] for k in range(options.jobs)]
     compared: dict[str, Difference] = {}
