@@ -63,7 +63,7 @@ def compare_figure(episodes: Mapping[str, Sequence[Episode]], success: SuccessCo
     left.set(xlabel="command (cm)", ylabel="success (%)", ylim=(0, 103))
     right.set(xlabel="command (cm)", ylabel="CoM rise (cm)")
     interval = Line2D([], [], ls="", marker="|", ms=10, color="k")
-    _name(figure, bars | {"95 % interval": interval}, loc="outside upper center", ncols=4)
+    _name(figure, bars | {"95 % interval": interval}, loc="outside upper center", ncols=5)
     _name(right, meanings)
     return figure
 
