@@ -102,7 +102,7 @@ def test_answers_do_not_depend_on_earlier_problems(seed, name):
 
 
 @pytest.mark.parametrize("name", sorted(SOLVERS))
-@pytest.mark.fault("random QPs")
+@pytest.mark.fault("broken programs")
 def test_infeasible_problems_are_not_solved(name):
     problem = random_problem(3)
     problem.C[-1] = problem.C[-2]
@@ -131,7 +131,7 @@ def test_what_is_refused_at_once_takes_no_iteration(name):
     [*((field, np.nan) for field in ("H", "g", "C", "lower", "upper")),
      ("H", np.inf), ("g", np.inf), ("C", -np.inf), ("H", -1e6), ("lower", 5.0)],
 )  # fmt: skip
-@pytest.mark.fault("random QPs")
+@pytest.mark.fault("broken programs")
 def test_a_problem_without_solution_prints_nothing(capfd, field, value, built_before):
     """OSQP complains on stdout even if told to be silent."""
     poison = poisoned(field, value)

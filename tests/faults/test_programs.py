@@ -103,7 +103,7 @@ LEAST_SOLVED = {"daqp": 1.0, "osqp": 0.9}
 """Share of the cases; the rest is told as failed."""
 
 
-@pytest.mark.fault("random QPs")
+@pytest.mark.fault("broken programs")
 @pytest.mark.parametrize("name", LEAST_SOLVED)
 @pytest.mark.parametrize("kind", [*SOLVABLE, *BROKEN])
 def test_what_is_called_solved_is_what_others_find(many, kind, name):
