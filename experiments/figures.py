@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from experiments.frontier import Point
     from experiments.planners import Point as PlannerPoint
 
-CLOSE = 0.4
-"""Points nearer than this (cm) have their labels on either side."""
+CLOSE = (15.0, 0.4)
+"""Points nearer than this (% landed, cm) have their labels on either side."""
 
 
 def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
@@ -108,10 +108,12 @@ def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
                 elinewidth=0.7, ms=5,
             )  # fmt: skip
             for x, y, point in zip(share, rise, shown, strict=True):
-                near = [other for other in rise if abs(other - y) < CLOSE]
+                is_near = (np.abs(share - x) < CLOSE[0]) & (np.abs(rise - y) < CLOSE[1])
+                above = y == rise[is_near].max()
                 axis.annotate(
                     f"{CM * point.jump_height:g}", (x, y), textcoords="offset points",
-                    xytext=(5, 4 if y == max(near) else -11), fontsize=8, color=color,
+                    xytext=(5, 4) if above else (-5, -11), ha="left" if above else "right",
+                    fontsize=8, color=color,
                 )  # fmt: skip
         axis.set_title(f"{controller} controller, {world}", fontsize=10)
         axis.set(xlim=(0, 112), ylim=(0, 8))
