@@ -6,7 +6,7 @@
 The robot's own sensors, servos and main loop stand where MuJoCo's are here.
 """
 
-import sys
+import argparse
 
 import mujoco
 import numpy as np
@@ -29,7 +29,7 @@ STIFFNESS, DAMPING = 1500.0, 50.0  # of the joint servos (Nm/rad, Nm s/rad)
 STEP = 0.001  # of the physics (s)
 
 
-def main(kind: str = "velocity") -> None:
+def main(kind: str) -> None:
     """Jump, and say how high the robot rises."""
     robot = load_robot()
     plan = ScaledCurvePlanner(FeetFixedKinematics(robot)).plan(0.04)
@@ -85,4 +85,6 @@ def main(kind: str = "velocity") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kind", nargs="?", choices=("velocity", "torque"), default="velocity")
+    main(parser.parse_args().kind)

@@ -210,7 +210,7 @@ def feedback_figure(launches: Launches, residual: ResidualConfig) -> Figure:
             _band(rows[1, column], middles, bins, color, label)
         moved = f"{name} residual ({unit})"
         describe(rows[0, column], "by the slope of the ground", moved, "time (ms)")
-        describe(rows[1, column], "around a push", moved, "time since the push (ms)")
+        describe(rows[1, column], "around a push", moved, "time since its end (ms)")
         for axis in rows[:, column]:
             axis.axhline(0.0, color="0.8", lw=0.8, zorder=0)
     for row in rows:

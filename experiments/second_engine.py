@@ -80,7 +80,7 @@ RELAXATION_TIME = 0.005
 INFINITE = 1e6
 """A coefficient of friction that leaves the other one's in the harmonic mean."""
 MODULUS = 1e6
-"""Of that (Pa): under a sole that carries half the robot it gives way by less than 0.1 mm."""
+"""Of the rubber (Pa), unless asked otherwise: under a sole that carries half the robot it gives way by less than 0.1 mm."""
 LAW, POLICY = "law, 5 cm, disturbed", "policy, 5 cm, disturbed"
 
 

@@ -65,7 +65,8 @@ class Lean:
 
 def test_a_policy_in_python_is_an_entry_and_another_one_jumps_anew(few):
     found = [
-        jump(JumpConfig(), "mine", Contender("lean", Lean(forward))) for forward in (0.0, 0.2, 0.2)
+        jump(JumpConfig(), "mine", Contender("lean", Lean(forward), version=f"{forward}"))
+        for forward in (0.0, 0.2, 0.2)
     ]
     still, moved, again = (result.scores["nominal"].rise for result in found)
     assert still == jump(JumpConfig(), "plain").scores["nominal"].rise

@@ -105,10 +105,13 @@ def test_a_worker_of_a_node_killed_at_any_time_changes_nothing(nodes, many, rng,
         with subprocess.Popen(
             [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         ) as run:
+            busy = []
             while run.poll() is None and not (busy := busy_workers()):
                 time.sleep(0.02)
             time.sleep(rng.uniform(0.0, 1.0))
-            busy[0].kill()
+            assert busy
+            with contextlib.suppress(psutil.NoSuchProcess):
+                busy[0].kill()
             assert run.communicate() == (out, f"wrote {log}\n")
         assert run.returncode == 0
         assert Path(log).read_bytes() == Path("local.jsonl").read_bytes()

@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import shlex
+from functools import partial
 
 import numpy as np
 import pytest
@@ -109,12 +110,12 @@ class TestInNoFile:
         assert Contender("a", FEEDBACK).identity != BASELINE.identity
         assert not Contender("a", own).is_baseline
 
-    def test_what_cannot_be_told_from_others_is_refused(self):
-        def inner(observation):
-            return own(observation)
+    def test_what_is_bound_to_it_is_told_by_the_version(self):
+        first = Contender("a", partial(own), version="1").identity
+        assert first == Contender("a", own, version="1").identity
+        assert first != Contender("a", partial(own), version="2").identity
 
-        with pytest.raises(ConfigError, match=r"policy='a' is not allowed: expected .*pickled"):
-            _ = Contender("a", inner).identity
+    def test_what_cannot_be_told_from_others_is_refused(self):
         made = eval("lambda observation: observation[:3]")
         with pytest.raises(ConfigError, match="a file"):
             _ = Contender("a", made).identity

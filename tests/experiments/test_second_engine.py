@@ -60,6 +60,17 @@ def test_a_step_in_the_air_is_mujocos(moving):
     np.testing.assert_allclose(twin.state()[1], data.qvel, atol=1e-2 * change)
 
 
+def test_a_robot_sinks_deeper_into_a_softer_floor():
+    heights = []
+    for modulus in (MODULUS, MODULUS / 10.0):
+        env = DrakeEnv(modulus)
+        env.reset(seed=0)
+        for _ in range(3):
+            env.step(np.zeros(3))
+        heights.append(env.data.qpos[2])
+    assert heights[0] > heights[1] + 1e-5
+
+
 def test_standing_the_soles_carry_the_weight():
     env = DrakeEnv()
     env.reset(seed=0)

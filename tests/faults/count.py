@@ -38,24 +38,25 @@ class Count:
     """Counts the cases of each test, and writes a line for each that ends.
 
     Attributes:
-        entries: The lines, of this code alone.
+        entries: The lines, of this code and of the wanted fault alone.
+        faults: All there are.
     """
 
     def __init__(self, file, fault):
         self._file, self._fault = file, fault
         self._code, self._cases = code(), Counter()
-        self.entries = []
+        kept = []
         for line in file.read_text().splitlines() if file.exists() else []:
             with contextlib.suppress(ValueError):  # half a line
-                entry = json.loads(line)
-                if entry["code"] == self._code:
-                    self.entries.append(entry)
-        lines = (json.dumps(entry) + "\n" for entry in self.entries)
-        file.write_text("".join(lines))
+                kept.append(json.loads(line))
+        file.write_text("".join(json.dumps(entry) + "\n" for entry in kept))
+        self.entries = [e for e in kept if e["code"] == self._code and fault in (None, e["fault"])]
 
     def pytest_collection_modifyitems(self, items):
         from hypothesis import is_hypothesis_test  # pytest wants to be first
 
+        markers = (item.get_closest_marker("fault") for item in items)
+        self.faults = {marker.args[0] for marker in markers if marker}
         done = {e["test"] for e in self.entries if not e["failed"] and not e["skipped"]}
         items[:] = [item for item in items if item.nodeid not in done and self._wants(item)]
         # A test with parameters is several items.
@@ -132,6 +133,9 @@ def main():
     words = [str(REPOSITORY / "tests"), "-m", "fault", "-q", *([] if quick else ["--full"])]
     with contextlib.redirect_stdout(printed):
         ended = pytest.main(words, plugins=[count])
+    if options.fault not in (None, *count.faults):
+        names = ", ".join(sorted(count.faults))
+        sys.exit(f"error: fault={options.fault!r} is not allowed: expected one of {names}")
     show(Console(), table_of(count.entries))
     if ended != pytest.ExitCode.OK and not (
         count.entries and ended == pytest.ExitCode.NO_TESTS_COLLECTED

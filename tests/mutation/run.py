@@ -6,13 +6,14 @@
 Cosmic Ray makes all mutants of the packages that decide what is measured and commanded: another
 operator, comparison or number, a condition turned round, a line less. A random sample of them is tried.
 The tests of a mutant's own package come first, the others if those notice nothing. What came of each
-is kept in ``tried.jsonl``: without this file, all are tried again; with it, those that are new, and
-those that no test noticed, as there may be one by now.
+is kept in ``tried.jsonl``: with it, those are tried again whose place or line has changed, and those
+that nothing noticed or explains, as there may be a test by now; without it, all.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import queue
@@ -161,13 +162,16 @@ def tried() -> dict[Mutant, bool]:
     """Whether each mutant that was ever tried was noticed the last time."""
     noticed = {}
     for line in TRIED.read_text().splitlines() if TRIED.exists() else []:
-        *mutant, was_noticed = json.loads(line)
-        noticed[Mutant(*mutant)] = was_noticed
+        with contextlib.suppress(ValueError):  # half a line
+            *mutant, was_noticed = json.loads(line)
+            noticed[Mutant(*mutant)] = was_noticed
     return noticed
 
 
 def try_all(mutants: Sequence[Mutant], jobs: int) -> None:
     """Try mutants, and keep what comes of each."""
+    lines = (json.dumps([*mutant, was_noticed]) + "\n" for mutant, was_noticed in tried().items())
+    TRIED.write_text("".join(lines))
     with (
         TemporaryDirectory() as folder,
         TRIED.open("a") as file,
@@ -179,15 +183,16 @@ def try_all(mutants: Sequence[Mutant], jobs: int) -> None:
             sys.exit("error: tests fail without any mutant")
         free.put(copy)
 
-        def attempt(mutant: Mutant) -> bool:
+        def attempt(mutant: Mutant) -> None:
             copy = free.get()
             try:
-                return is_noticed(mutant, copy)
+                line = json.dumps([*mutant, is_noticed(mutant, copy)])
+                print(line, file=file, flush=True)
             finally:
                 free.put(copy)
 
-        for mutant, was_noticed in zip(mutants, pool.map(attempt, mutants), strict=True):
-            print(json.dumps([*mutant, was_noticed]), file=file, flush=True)
+        for _ in pool.map(attempt, mutants):
+            pass
 
 
 def main() -> None:

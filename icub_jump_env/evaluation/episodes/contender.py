@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
-import pickle
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,42 +25,42 @@ class Contender:
     Attributes:
         name: Its name in tables.
         policy: What acts.
-        card: Its card; None for the baseline, and for a policy that is in no file.
+        card: Its card; None for the baseline, and for a policy written in Python.
+        version: Tells policies written in the same Python file apart: change it with what they hold.
     """
 
     name: str
     policy: Policy
     card: PolicyCard | None = None
+    version: str = ""
 
     @property
     def is_baseline(self) -> bool:
         """Whether it is the pure controller."""
-        return isinstance(self.policy, type(policy.BASELINE))
+        return type(self.policy) is type(policy.BASELINE)
 
     @property
     def identity(self) -> dict[str, str | None]:
         """For logs and JSON: name, and a hash.
 
-        It is the hash of the card, in which that of the numbers is; without a card, of the code and of
-        what the policy holds.
+        It is the hash of the card, in which that of the numbers is; without a card, of the version and
+        of the file in which the policy is written, not of what this file imports.
 
         Raises:
-            ConfigError: If a policy without a card is in no file, or cannot be pickled.
+            ConfigError: If a policy without a card is written in no file.
         """
         if self.is_baseline:
             return {"name": self.name, "sha256": None}
         if self.card is not None:
-            known = strict_json(self.card.as_dict()).encode()
+            known = strict_json(self.card.as_dict())
         else:
-            written = self.policy if inspect.isroutine(self.policy) else type(self.policy)
-            known = code("policy", written).encode() + self._pickled()
-        return {"name": self.name, "sha256": hashlib.sha256(known).hexdigest()}
-
-    def _pickled(self) -> bytes:
-        try:
-            return pickle.dumps(self.policy)
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            raise ConfigError("policy", self.name, f"what can be pickled: {error}") from error
+            written = self.policy
+            while isinstance(written, functools.partial):
+                written = written.func
+            known = self.version + code(
+                "policy", written if inspect.isroutine(written) else type(written)
+            )
+        return {"name": self.name, "sha256": hashlib.sha256(known.encode()).hexdigest()}
 
 
 BASELINE = Contender("baseline", policy.BASELINE)

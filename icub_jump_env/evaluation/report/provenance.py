@@ -94,7 +94,7 @@ def code(field: str, what: Any) -> str:
     try:
         written = Path(inspect.getfile(what)).read_bytes()
     except (TypeError, OSError):
-        raise ConfigError(field, what.__qualname__, "written in a file") from None
+        raise ConfigError(field, what.__qualname__, "code in a file") from None
     return f"{what.__module__}.{what.__qualname__} {hashlib.sha256(written).hexdigest()[:16]}"
 
 
