@@ -58,11 +58,12 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
         color = colors[point.contender.name]
         axis.plot(*place, markers[point.jump_height], color=color, ms=6)
         if color == baseline:
-            # Neighbours of other commands below.
-            height = -10 if heights.index(point.jump_height) % 2 else 4
+            # Neighbours of other commands on the other side.
+            below = heights.index(point.jump_height) % 2 == 1
             axis.annotate(
                 f"{CM * point.displacement:g}", place, textcoords="offset points",
-                xytext=(4, height), fontsize=8, color=color,
+                xytext=(4, -10) if below else (-4, 4), ha="left" if below else "right",
+                fontsize=8, color=color,
             )  # fmt: skip
         if point in chosen:
             axis.plot(*place, "o", ms=13, mfc="none", mec="k")
