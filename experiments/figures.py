@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from experiments.frontier import Point
     from experiments.planners import Point as PlannerPoint
 
-CLOSE = (15.0, 0.4)
-"""Points nearer than this (% landed, cm) have their labels on either side."""
+Place = tuple[float, float]
+"""Of a point, in the units of the axes."""
 
 
 def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
@@ -53,18 +53,13 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
     colors = dict(zip(names, (baseline, constant, policy), strict=True))
     heights = sorted({point.jump_height for point in points})
     markers = dict(zip(heights, ("o", "s", "^", "D"), strict=False))
+    labels: dict[Place, str] = {}
     for point in points:
         place = PERCENT * point.summary.success.share, CM * point.summary.mean_rise
         color = colors[point.contender.name]
         axis.plot(*place, markers[point.jump_height], color=color, ms=6)
         if color == baseline:
-            # Neighbours of other commands on the other side.
-            below = heights.index(point.jump_height) % 2 == 1
-            axis.annotate(
-                f"{CM * point.displacement:g}", place, textcoords="offset points",
-                xytext=(4, -10) if below else (-4, 4), ha="left" if below else "right",
-                fontsize=8, color=color,
-            )  # fmt: skip
+            labels[place] = f"{CM * point.displacement:g}"
         if point in chosen:
             axis.plot(*place, "o", ms=13, mfc="none", mec="k")
     shown: list[tuple[str, dict[str, Any]]] = [
@@ -80,8 +75,32 @@ def frontier_figure(points: Sequence[Point], chosen: Sequence[Point]) -> Figure:
         handles=handles, frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5)
     )
     axis.set(xlabel="success (%)", ylabel="mean CoM rise (cm)")
+    _write(figure, axis, labels, baseline)
     axis.set_title("marks: command; numbers: displacement of baselines (cm)", fontsize=9)
     return figure
+
+
+def _write(figure: Figure, axis: Axes, labels: Mapping[Place, str], color: str) -> None:
+    """Write each label on the side of its point with the most room."""
+    figure.draw_without_rendering()  # which lays out the axes
+    points = (xy for line in axis.lines for xy in np.asarray(line.get_xydata()))
+    taken = [axis.transData.transform(xy) for xy in points]
+    taken += [text.get_window_extent().get_points().mean(axis=0) for text in axis.texts]
+    for place, label in labels.items():
+        here = axis.transData.transform(place)
+        others = np.array([other for other in taken if np.hypot(*(other - here)) > 1.0])
+        sides = [np.array(side) * figure.dpi / 72 for side in _SIDES]
+        room = [np.hypot(*(others - here - side).T).min() for side in sides]
+        side = int(np.argmax(room))
+        axis.annotate(
+            label, place, textcoords="offset points", xytext=_SIDES[side],
+            ha="center", va="center", fontsize=8, color=color,
+        )  # fmt: skip
+        taken.append(here + sides[side])
+
+
+_SIDES = ((11, 7), (11, -7), (-11, 7), (-11, -7))
+"""Where a label may be, beside its point (points of 1/72 inch)."""
 
 
 def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
@@ -93,6 +112,7 @@ def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
     colors = dict(zip(("scaled_curve", "whole_body"), (DESIRED, MEASURED), strict=True))
     cells = itertools.product(("full", "hard"), CONTROLLERS)
     for axis, (world, controller) in zip(axes.flat, cells, strict=True):
+        labels: dict[str, dict[Place, str]] = {}
         for planner, color in colors.items():
             shown = [
                 p
@@ -108,16 +128,15 @@ def planners_figure(points: Sequence[PlannerPoint]) -> Figure:
                 share, rise, np.abs(rises - rise), np.abs(shares - share), "o", color=color,
                 elinewidth=0.7, ms=5,
             )  # fmt: skip
-            for x, y, point in zip(share, rise, shown, strict=True):
-                is_near = (np.abs(share - x) < CLOSE[0]) & (np.abs(rise - y) < CLOSE[1])
-                above = y == rise[is_near].max()
-                axis.annotate(
-                    f"{CM * point.jump_height:g}", (x, y), textcoords="offset points",
-                    xytext=(5, 4) if above else (-5, -11), ha="left" if above else "right",
-                    fontsize=8, color=color,
-                )  # fmt: skip
+            places = zip(share.tolist(), rise.tolist(), strict=True)
+            labels[color] = {
+                place: f"{CM * point.jump_height:g}"
+                for place, point in zip(places, shown, strict=True)
+            }
         axis.set_title(f"{controller} controller, {world}", fontsize=10)
         axis.set(xlim=(0, 112), ylim=(0, 8))
+        for color, of_planner in labels.items():
+            _write(figure, axis, of_planner, color)
     for axis in axes[-1]:
         axis.set_xlabel("landed (%)")
     for axis in axes[:, 0]:
