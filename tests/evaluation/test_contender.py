@@ -11,6 +11,7 @@ import pytest
 from contenders import FEEDBACK, evaluate, refusal, save, save_constant
 from rich.console import Console
 
+from experiments.rivals import constant_shift
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError
 from icub_jump_env.evaluation.episodes.contender import BASELINE, Contender, read_contenders
@@ -18,7 +19,7 @@ from icub_jump_env.evaluation.episodes.log import EpisodeLog
 from icub_jump_env.evaluation.episodes.rollout import make_env, run_episode, traced
 from icub_jump_env.evaluation.figures import policy as policy_figures
 from icub_jump_env.evaluation.modes import video, view
-from icub_jump_env.policy import load_policy
+from icub_jump_env.policy import ReplayPolicy, load_policy
 
 QUIET = Console(file=io.StringIO())
 SHORT = ("--stand-time", "0.1")
@@ -114,6 +115,22 @@ class TestInNoFile:
         first = Contender("a", partial(own), version="1").identity
         assert first == Contender("a", own, version="1").identity
         assert first != Contender("a", partial(own), version="2").identity
+
+    def test_its_numbers_tell_a_network_or_replay_from_others(self):
+        numbers = np.zeros((1, 2, 3), np.float32)
+        made = [
+            ReplayPolicy(np.float32([0.04]), actions, 20.0) for actions in (numbers, numbers + 0.1)
+        ]
+        made += [ReplayPolicy(np.float32([0.04]), numbers, 25.0)]
+        made += [constant_shift(forward, 0.0) for forward in (0.0, 0.1)]
+        assert len({Contender("a", policy).identity["sha256"] for policy in made}) == len(made)
+        again = ReplayPolicy(np.float32([0.04]), numbers.copy(), 20.0)
+        assert Contender("a", again).identity == Contender("a", made[0]).identity
+
+    def test_a_policy_from_a_file_brings_its_card(self, tmp_path):
+        file = save(tmp_path / "a.safetensors", FEEDBACK)
+        (read,) = read_contenders([str(file)])
+        assert Contender("a", load_policy(file)).identity == read.identity
 
     def test_what_cannot_be_told_from_others_is_refused(self):
         made = eval("lambda observation: observation[:3]")

@@ -10,12 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from safetensors.numpy import save
+
 from icub_jump_env import policy
 from icub_jump_env.config import JumpConfig
 from icub_jump_env.errors import ConfigError, ICubJumpError, PolicyMismatchError, printable
 from icub_jump_env.evaluation.report.provenance import code
 from icub_jump_env.files import strict_json
 from icub_jump_env.policy import Policy, PolicyCard, check_match, load_policy
+from icub_jump_env.policy.saving import LoadedPolicy, SavedPolicy
 
 
 @dataclass(frozen=True)
@@ -25,14 +28,17 @@ class Contender:
     Attributes:
         name: Its name in tables.
         policy: What acts.
-        card: Its card; None for the baseline, and for a policy written in Python.
         version: Tells policies written in the same Python file apart: change it with what they hold.
     """
 
     name: str
     policy: Policy
-    card: PolicyCard | None = None
     version: str = ""
+
+    @property
+    def card(self) -> PolicyCard | None:
+        """The card of a policy from a file; else None."""
+        return self.policy.card if isinstance(self.policy, LoadedPolicy) else None
 
     @property
     def is_baseline(self) -> bool:
@@ -43,8 +49,9 @@ class Contender:
     def identity(self) -> dict[str, str | None]:
         """For logs and JSON: name, and a hash.
 
-        It is the hash of the card, in which that of the numbers is; without a card, of the version and
-        of the file in which the policy is written, not of what this file imports.
+        It is the hash of the card, in which that of the numbers is; without a card, of the version, of
+        the file in which the policy is written, not of what this file imports, and of the numbers of
+        a network or a replay.
 
         Raises:
             ConfigError: If a policy without a card is written in no file.
@@ -60,6 +67,8 @@ class Contender:
             known = self.version + code(
                 "policy", written if inspect.isroutine(written) else type(written)
             )
+        if isinstance(self.policy, SavedPolicy):
+            known += f"{self.policy} {hashlib.sha256(save(self.policy.tensors())).hexdigest()}"
         return {"name": self.name, "sha256": hashlib.sha256(known.encode()).hexdigest()}
 
 
@@ -88,7 +97,7 @@ def read_contenders(words: Sequence[str]) -> list[Contender]:
         loaded = load_policy(path)
         alone = called[path.stem] == 1
         name = path.stem if alone else f"{path.absolute().parent.name}-{path.stem}"
-        contenders.append(Contender(printable(name), loaded, loaded.card))
+        contenders.append(Contender(printable(name), loaded))
     if len({contender.name for contender in contenders}) < len(contenders):
         raise ConfigError("compare", tuple(words), "policies of different names")
     return contenders
