@@ -27,6 +27,8 @@ from icub_jump_env.robot.robot import load_robot
 ROBOT = load_robot()
 FAMILIES = {name: family_of(ROBOT, name) for name in ("velocity", "torque")}
 ZERO = np.zeros(3, dtype=np.float32)
+RATES = ("velocity", "acceleration")
+STATES = ("position", *RATES)
 
 
 def plan_of(name, height):
@@ -182,6 +184,10 @@ class TestFiles:
             (lambda f: {"branch": np.arange(len(f.rise))}, "two plans or more"),
             (lambda f: {"rise": f.rise[None]}, "rise has the shape"),
             (lambda f: {"velocity": f.velocity[:, 1:]}, "different shapes"),
+            (lambda f: {"acceleration": f.acceleration[:, 1:]}, "different shapes"),
+            (lambda f: {"position": f.position[:, 1:]}, "different shapes"),
+            (lambda f: {name: getattr(f, name)[:, 1:] for name in RATES}, "different shapes"),
+            (lambda f: {name: getattr(f, name)[:, :1] for name in STATES}, "different shapes"),
             (lambda f: {"landing": f.landing[:, 1:]}, "other joints"),
             (lambda f: {"card": {**f.card, "format": 0}}, "its card is not of format 1"),
             (lambda f: {"card": {**f.card, "optimum": None}}, "what binds"),
