@@ -1,10 +1,13 @@
 """The shaping filter of the residual."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from icub_jump_env.planning.residual import N_AXES, ResidualConfig, ResidualFilter
+from icub_jump_env.planning.residual import AXES, N_AXES, ResidualConfig, ResidualFilter
 
 targets = st.lists(st.floats(-0.1, 0.1), min_size=N_AXES, max_size=N_AXES).map(np.array)
 
@@ -62,6 +65,18 @@ def test_a_step_is_90_percent_done_after_0_26_s_at_the_default_bandwidth():
     residual = ResidualFilter(ResidualConfig().bandwidth)
     residual.step(np.ones(N_AXES), 0.26)
     np.testing.assert_allclose(residual.offset, 0.9, atol=0.005)
+
+
+def test_an_action_of_1_moves_each_axis_by_what_the_document_says():
+    document = (Path(__file__).parents[2] / "docs" / "environment.md").read_text()
+    rows = re.findall(
+        r"^\| (`forward`.*|`roll`.*) \| .* \| ([\d., ]+) \w.* \|$", document, re.MULTILINE
+    )
+    names = [name for axes, _ in rows for name in re.findall(r"`(\w+)`", axes)]
+    told = [float(number) for _, numbers in rows for number in numbers.split(",")]
+    assert tuple(names) == AXES
+    config = ResidualConfig(axes=AXES)
+    np.testing.assert_array_equal(config.matrix @ np.ones(N_AXES), told)
 
 
 def test_twice_the_bandwidth_is_twice_as_fast():
