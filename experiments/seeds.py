@@ -20,7 +20,9 @@ __all__ = [
 ]
 
 TUNING = range(200)
-"""Tuned the controllers; choose constants, mean actions and the strongest baselines."""
+"""Tuned the controllers; choose constants, mean actions and the strongest baselines.
+
+The next 30 judge the estimators."""
 
 TEST = range(4000, 4500)
 """Held out: reported, and nothing is chosen on them.
