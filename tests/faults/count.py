@@ -130,7 +130,9 @@ def main():
     elif file.exists():
         print(f"going on with {file}; without it, all is tried again", file=sys.stderr)
     count, printed = Count(file, options.fault), io.StringIO()
-    words = [str(REPOSITORY / "tests"), "-m", "fault", "-q", *([] if quick else ["--full"])]
+    words = [str(REPOSITORY / "tests"), "-m", "fault", "-q"]
+    if not quick:  # a test may take hours
+        words += ["--full", "-o", "faulthandler_timeout=0"]
     with contextlib.redirect_stdout(printed):
         ended = pytest.main(words, plugins=[count])
     if options.fault not in (None, *count.faults):
