@@ -196,6 +196,7 @@ def test_landed_only_after_the_stand_time():
         ({"joint_torque": np.array([37.0, 0.0])}, False),
         ({"joint_torque": np.array([37.1, 0.0])}, True),
         ({"joint_position": np.array([1.0, 0.0])}, False),
+        ({"joint_position": np.array([0.0, 1.01])}, True),
         ({"joint_position": np.array([-1.01, 0.0])}, True),
     ],
 )
