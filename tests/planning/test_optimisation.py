@@ -27,6 +27,7 @@ from icub_jump_env.planning.whole_body import build
 from icub_jump_env.planning.whole_body.binding import binding
 from icub_jump_env.planning.whole_body.landing import LandingProgram
 from icub_jump_env.planning.whole_body.launch import (
+    HIP,
     Launch,
     LaunchProgram,
     largest_speeds,
@@ -196,6 +197,18 @@ def test_a_search_finds_the_shipped_plan_again(model):
     np.testing.assert_allclose(
         model.posture(launch.q), FAMILY.position[heights.index(0.05)], atol=1e-4
     )
+
+
+def test_a_search_finds_a_shipped_plan_again_whose_hips_close_as_far_as_they_may(model):
+    margins = MARGINS["velocity"].branches
+    program = LaunchProgram(model, margins[0].launch)
+    program.keep(margins[1].launch)
+    crouch = program.highest(*margins[1].starts[0]).q[0]
+    member = list(FAMILY.branch).index(1)
+    above = shipped_launch(model, "velocity", member + 1)
+    launch = program.to_height(FAMILY.card["plans"][member]["height"], above, crouch)
+    assert launch.q[-1, HIP] == pytest.approx(margins[1].launch.takeoff_hip, abs=1e-6)
+    np.testing.assert_allclose(model.posture(launch.q), FAMILY.position[member], atol=1e-4)
 
 
 @pytest.mark.parametrize("name", MARGINS)

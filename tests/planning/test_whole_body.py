@@ -183,6 +183,7 @@ class TestFiles:
             (lambda f: {"rise": f.rise[::-1]}, "ascending"),
             (lambda f: {"branch": np.arange(len(f.rise))}, "two plans or more"),
             (lambda f: {"rise": f.rise[None]}, "rise has the shape"),
+            (lambda f: {"rise": f.rise.astype(object)}, "not a family of plans"),  # a pickle
             (lambda f: {"velocity": f.velocity[:, 1:]}, "different shapes"),
             (lambda f: {"acceleration": f.acceleration[:, 1:]}, "different shapes"),
             (lambda f: {"position": f.position[:, 1:]}, "different shapes"),
