@@ -22,7 +22,8 @@ __all__ = [
 TUNING = range(200)
 """Tuned the controllers; choose constants, mean actions and the strongest baselines.
 
-The next 30 judge the estimators."""
+The next 30 judge the estimators.
+"""
 
 TEST = range(4000, 4500)
 """Held out: reported, and nothing is chosen on them.
